@@ -33,7 +33,7 @@ const marrow::Catalogue& writing_catalogue() {
   static const marrow::Catalogue catalogue([] {
     const fs::path build = MARROW_BINARY_DIR;
     for (const fs::path& library :
-         {build / "tests" / "plugins" / "marrow_test_numbers", build / "lib" / "marrow" / "marrow_write_text"})
+         {build / "tests" / "plugins" / "marrow_test_numbers", build / "lib" / "marrow" / "marrow_write"})
       for (const char* extension : {".so", ".json"}) fs::copy(library.string() + extension, plugins.path);
     return std::vector<fs::path>{plugins.path};
   }());

@@ -7,7 +7,7 @@ import yaml
 
 from harness import SOURCE
 from harness.cases import metrics
-from harness.program import Case, main, marrow
+from harness.program import Case, main
 
 PIPELINES = SOURCE / "pipelines" / "implant"
 REAL = SOURCE / "../shared/data/implants/biplane"
@@ -15,10 +15,9 @@ REAL = SOURCE / "../shared/data/implants/biplane"
 
 class Implants(Case):
     def run_pipeline(self, name, *arguments):
-        out = self.scratch / "run"
-        result = marrow("run", PIPELINES / name, *arguments, "--out", out, "--quiet")
+        result = self.marrow("run", PIPELINES / name, *arguments, "--out", "out", "--quiet")
         self.assertIn(result.returncode, (0, 3), result.stderr)  # 3: the verdict is not that it is trusted
-        return out / "outputs"
+        return self.scratch / "out/outputs"
 
     def test_a_simulated_part_is_found(self):
         outputs = self.run_pipeline("simulated-implant.yaml", "--set", "made.model.resolution_mm=1.5")

@@ -1,13 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A kind, nodes and a decorator that libraries outside the tree bring: docs/example-kind, used in every way."""
+"""Libraries outside the tree: docs/example-kind, which brings a kind, nodes and a decorator and is used in every way,
+docs/example-plugin, the smallest one, and one that builds on the toolbox."""
 import json
 import shutil
 import subprocess
 import unittest
 
-from harness.cases import FEMUR, SMALL, simulate
 from harness import BUILD, SOURCE
-from harness.program import IS_SANITIZED, Case, main, marrow
+from harness.cases import FEMUR, SMALL, simulate
+from harness.program import IS_SANITIZED, SharedCase, main
 
 WRONG = """
 marrow::View unchanged(const marrow::View& view) { return view; }
@@ -18,6 +19,7 @@ marrow::View larger(const marrow::View& view) {
 }
 marrow::Image picture(const marrow::View& view) { return view.image; }
 }  // namespace
+MARROW_PLUGIN(plugin) {
 """
 WRONG_NODES = """
   plugin.node("denoise.unchanged", unchanged).summary("Nothing").in("view", "h").out("view", "h");
@@ -28,6 +30,12 @@ BROKEN_NODES = """
   plugin.node("denoise.picture", picture).summary("Another type").in("view", "h").out("view", "h");
 }
 """
+ON_TOOLBOX = """cmake_minimum_required(VERSION 3.25)
+project(mine CXX C)
+find_package(marrow REQUIRED COMPONENTS toolbox)
+marrow_add_plugin(edges_mine mine.cpp LINK marrow::edges)
+"""
+ALL = "cmake_minimum_required(VERSION 3.25)\nproject(all CXX C)\n"  # one project, so that packages are looked for once
 EXPERIMENT = """experiment: 1
 pipeline: quiet.yaml
 cases: {folders: [%s], input: case}
@@ -39,36 +47,35 @@ metrics: [errors.distal.final.mtre_mm]
 """
 
 
-def without_ends(text):
-    """nodes.cpp up to the end of its namespace, and its declarations."""
-    algorithms, declarations = text.split("}  // namespace\n")
-    return algorithms, declarations[: declarations.rindex("}")]
+def lines_of(folder):
+    return sum(len(path.read_text().splitlines()) for path in folder.iterdir() if path.suffix != ".py")
 
 
 @unittest.skipIf(IS_SANITIZED, "a plugin outside the tree is built without the sanitizer, which marrow would refuse")
-class Kinds(Case):
-    @classmethod
-    def setUpClass(cls):
-        cls.shared = cls.shared_folder()
-        folder = cls.shared / "mine"
-        shutil.copytree(SOURCE / "docs" / "example-kind", folder)
-        cls.lines = sum(len(path.read_text().splitlines()) for path in folder.iterdir())
-        algorithms, declarations = without_ends((folder / "nodes.cpp").read_text())
-        (folder / "wrong.cpp").write_text(algorithms + WRONG + "MARROW_PLUGIN(plugin) {" + WRONG_NODES)
-        (folder / "broken.cpp").write_text(algorithms + WRONG + "MARROW_PLUGIN(plugin) {" + BROKEN_NODES)
-        with open(folder / "CMakeLists.txt", "a") as cmake:
-            cmake.write("marrow_add_plugin(wrong wrong.cpp LINK opencv_imgproc FOLDER ${CMAKE_BINARY_DIR}/wrong)\n")
-            cmake.write("marrow_add_plugin(broken broken.cpp LINK opencv_imgproc FOLDER ${CMAKE_BINARY_DIR}/broken)\n")
-        cls.build = cls.shared / "build"
-        configure = ["cmake", "-S", folder, "-B", cls.build, "-G", "Ninja", "-Dmarrow_DIR=%s" % BUILD]
-        subprocess.run(configure, check=True, stdout=subprocess.DEVNULL)
-        subprocess.run(["cmake", "--build", cls.build], check=True, stdout=subprocess.DEVNULL)
+class Kinds(SharedCase):
+    plugins = []
 
-    def marrow(self, *arguments, more=(), **options):
-        return marrow(*arguments, plugins=[self.build, *(self.build / name for name in more)], **options)
-
-    def pipeline(self):
-        """femur.yaml with less noise in its views, and an optimizer that starts another one."""
+    def make(self):
+        for name in ("kind", "plugin"):
+            shutil.copytree(SOURCE / "docs" / ("example-" + name), self.scratch / name)
+        self.lines = {name: lines_of(self.scratch / name) for name in ("kind", "plugin")}
+        algorithms = self.read("kind/nodes.cpp").split("}  // namespace\n")[0]
+        cmake = self.read("kind/CMakeLists.txt")
+        for name, nodes in (("wrong", WRONG_NODES), ("broken", BROKEN_NODES)):
+            self.write("kind/%s.cpp" % name, algorithms + WRONG + nodes)
+            added = "marrow_add_plugin({0} {0}.cpp LINK opencv_imgproc FOLDER ${{CMAKE_BINARY_DIR}}/{0})\n"
+            cmake += added.format(name)
+        self.write("kind/CMakeLists.txt", cmake)
+        sobel = (SOURCE / "plugins" / "edges" / "sobel.cpp").read_text()
+        self.write("toolbox/mine.cpp", sobel.replace("edges.sobel", "edges.mine"))
+        self.write("toolbox/CMakeLists.txt", ON_TOOLBOX)
+        self.write("CMakeLists.txt", ALL + "".join("add_subdirectory(%s)\n" % n for n in ("kind", "plugin", "toolbox")))
+        self.build = self.scratch / "build"
+        configure = ["cmake", "-S", self.scratch, "-B", self.build, "-G", "Ninja", "-Dmarrow_DIR=%s" % BUILD]
+        subprocess.run(configure, check=True, capture_output=True)
+        subprocess.run(["cmake", "--build", self.build], check=True, stdout=subprocess.DEVNULL)
+        self.plugins = [self.build / "kind"]
+        # femur.yaml with less noise in its views, and an optimizer that starts another one
         text = FEMUR.read_text().replace("../", "%s/" % FEMUR.parents[1])
         text = text.replace("in: {view: case.views}, with: {low: 50, high: 75}}", "in: {view: quiet}}")
         text = text.replace(
@@ -77,102 +84,96 @@ class Kinds(Case):
             "  inner: {uses: optimizer.levenberg_marquardt}\n"
             "  optimizer: {uses: optimizer.restarts, in: {inner: inner}}\n",
         )
-        return self.write("quiet.yaml", text)
+        self.write("quiet.yaml", text)
+
+    def test_the_smallest_plugin_and_one_on_the_toolbox(self):
+        self.assertLessEqual(self.lines["plugin"], 40)
+        self.assertTrue((self.build / "plugin" / "marrow_steepest.json").exists())
+        for folder, node in (("plugin", "edges.steepest"), ("toolbox", "edges.mine")):
+            plugins = [self.build / folder]
+            self.assertIn(node, self.printed("list", "edges", plugins=plugins))
+            self.expect(0, "check", FEMUR, "--set", "edges.uses=" + node, plugins=plugins)
 
     def test_its_size(self):
-        self.assertLessEqual(self.lines, 120)
+        self.assertLessEqual(self.lines["kind"], 120)
 
     def test_it_is_listed_like_any_other(self):
-        listed = self.marrow("list", "denoise").stdout
+        listed = self.printed("list", "denoise")
         self.assertEqual(listed.splitlines()[0], "denoise: less noise in an X-ray view")
         self.assertIn("denoise.median", listed)
-        inspected = self.marrow("inspect", "denoise.median").stdout
+        inspected = self.printed("inspect", "denoise.median")
         self.assertIn("denoise: less noise in an X-ray view", inspected)
         self.assertIn("noise left of 10: at most 6 grey", inspected)
         self.assertIn("marrow_denoise.so: the kind denoise", self.marrow("doctor").stdout)
-        schema = json.loads(self.marrow("schema").stdout)
-        self.assertIn("denoise.median", json.dumps(schema))
+        self.assertIn("denoise.median", json.dumps(json.loads(self.printed("schema"))))
 
     def test_its_contract_is_listed(self):
-        self.assertIn("  denoise        less noise in an X-ray view\n", self.marrow("list", "--kinds").stdout)
-        kinds = {kind["name"]: kind for kind in json.loads(self.marrow("list", "--kinds", "--json").stdout)}
-        self.assertEqual([port["types"] for port in kinds["denoise"]["inputs"]], [["view"]])
+        self.assertIn("  denoise        less noise in an X-ray view\n", self.printed("list", "--kinds"))
+        kinds = {kind["name"]: kind for kind in self.json_of("list", "--kinds")}
+        types = lambda kind, ports: [port["types"] for port in kinds[kind][ports]]
+        self.assertEqual(types("denoise", "inputs"), [["view"]])
+        self.assertEqual(types("project", "outputs"), [["outline_projector", "radiograph_projector"]])
         limits = {check["name"]: check.get("limit") for check in kinds["denoise"]["checks"]}
         self.assertEqual((limits["noise"], limits["contract"]), (6, None))
-        self.assertEqual(
-            [port["types"] for port in kinds["project"]["outputs"]], [["outline_projector", "radiograph_projector"]]
-        )
         self.assertTrue(kinds["evaluate"]["sees_truth"])
         self.assertFalse(kinds["denoise"]["sees_truth"])
-        result = self.marrow("list", "--kinds", "edges")
-        self.assertEqual(result.returncode, 2)
+        self.expect(2, "list", "--kinds", "edges")
 
     def test_check_says_what_a_decorator_needs(self):
-        checked = self.marrow("check", FEMUR, "--set", "optimizer.uses=optimizer.restarts")
-        self.assertEqual(checked.returncode, 2)
-        self.assertIn("node 'optimizer': input 'inner' of optimizer.restarts is not wired", checked.stderr)
-        self.assertIn("add  in: {inner: ...}  with an optimizer (the optimizer that is started)", checked.stderr)
-        fits = json.loads(self.marrow("list", "--fits", FEMUR, "optimizer", "--json").stdout)
+        needed = [
+            "node 'optimizer': input 'inner' of optimizer.restarts is not wired",
+            "add  in: {inner: ...}  with an optimizer (the optimizer that is started)",
+        ]
+        self.refused(needed, "check", FEMUR, "--set", "optimizer.uses=optimizer.restarts")
+        fits = self.json_of("list", "--fits", FEMUR, "optimizer")
         missing = {fit["node"]: fit["missing"] for fit in fits if fit["fits"] == "with more"}
         self.assertEqual(missing, {"optimizer.restarts": ["wire inner: optimizer (the optimizer that is started)"]})
-        checked = self.marrow("check", self.pipeline())
-        self.assertEqual(checked.returncode, 0, checked.stderr)
+        self.expect(0, "check", "quiet.yaml")
 
     def test_conformance(self):
-        result = self.marrow("conformance", "denoise")
-        self.assertEqual(result.returncode, 0, result.stdout)
-        self.assertEqual(result.stdout.count("pass noise"), 2)
-        result = self.marrow("conformance", "optimizer.restarts", "--in", "inner=optimizer.nelder_mead")
-        self.assertEqual(result.returncode, 0, result.stdout)
-        result = self.marrow("conformance", "optimizer.restarts", "--check", "contract")
-        self.assertEqual(result.returncode, 1)
-        self.assertIn(
-            "it needs the input 'inner', which its kind does not have; give an input with --in", result.stdout
-        )
+        self.assertEqual(self.printed("conformance", "denoise").count("pass noise"), 2)
+        self.expect(0, "conformance", "optimizer.restarts", "--in", "inner=optimizer.nelder_mead")
+        contract = ["conformance", "optimizer.restarts", "--check", "contract"]
         for given, said in (
-            ("outer=optimizer.powell", "it has no input 'outer'"),
-            ("inner=optimizer.powel", "there is no node 'optimizer.powel'"),
-            ("inner=denoise.median", "denoise.median gives no optimizer for the input 'inner'"),
+            ([], "it needs the input 'inner', which its kind does not have; give an input with --in"),
+            (["--in", "outer=optimizer.powell"], "it has no input 'outer'"),
+            (["--in", "inner=optimizer.powel"], "there is no node 'optimizer.powel'"),
+            (["--in", "inner=denoise.median"], "denoise.median gives no optimizer for the input 'inner'"),
         ):
-            result = self.marrow("conformance", "optimizer.restarts", "--check", "contract", "--in", given)
-            self.assertEqual(result.returncode, 1)
-            self.assertIn(said, result.stdout)
+            self.assertIn(said, self.expect(1, *contract, *given).stdout)
 
     def test_wrong_nodes_are_caught(self):
-        result = self.marrow("conformance", "denoise.unchanged", "denoise.larger", more=["wrong"])
-        self.assertEqual(result.returncode, 1)
-        self.assertRegex(result.stdout, r"FAIL noise +(9\.|10)")
-        self.assertRegex(result.stdout, r"FAIL contract +the image has another size")
+        plugins = [*self.plugins, self.build / "wrong"]
+        said = self.expect(1, "conformance", "denoise.unchanged", "denoise.larger", plugins=plugins).stdout
+        self.assertRegex(said, r"FAIL noise +(9\.|10)")
+        self.assertRegex(said, r"FAIL contract +the image has another size")
 
     def test_a_node_that_breaks_the_contract_is_refused_wherever_it_lies(self):
-        result = self.marrow("doctor", more=["broken"])
-        self.assertEqual(result.returncode, 1)
+        plugins = [*self.plugins, self.build / "broken"]
         self.assertIn(
             "declares its nodes wrongly: denoise.picture: output 'view': the kind 'denoise' has it as view, not image",
-            result.stdout,
+            self.expect(1, "doctor", plugins=plugins).stdout,
         )
-        self.assertNotIn("denoise.picture", self.marrow("list", more=["broken"]).stdout)
+        self.assertNotIn("denoise.picture", self.marrow("list", plugins=plugins).stdout)
 
     def test_without_its_kind_nothing_can_be_checked(self):
         alone = self.scratch / "alone"
         alone.mkdir()
-        shutil.copy(self.build / "marrow_denoise_nodes.so", alone)
-        result = marrow("conformance", "denoise.median", plugins=[alone])
-        self.assertEqual(result.returncode, 1)
-        self.assertIn("nothing was checked: no library brings the kind 'denoise'", result.stdout)
-        result = marrow("conformance", "write.tfm")
-        self.assertEqual(result.returncode, 1)
-        self.assertIn("nothing was checked: the kind 'write' has no suite", result.stdout)
+        shutil.copy(self.build / "kind" / "marrow_denoise_nodes.so", alone)
+        for node, said in (
+            ("denoise.median", "no library brings the kind 'denoise'"),
+            ("write.tfm", "the kind 'write' has no suite"),
+        ):
+            told = self.expect(1, "conformance", node, plugins=[alone]).stdout
+            self.assertIn("nothing was checked: " + said, told)
 
     def test_in_a_comparison(self):
         case = simulate(self.scratch / "simulated", *SMALL)
-        self.pipeline()
-        experiment = self.write("experiment.yaml", EXPERIMENT % case)
-        result = self.marrow("compare", experiment, "--out", self.scratch / "out")
-        self.assertEqual(result.returncode, 0, result.stderr)
-        cells = (self.scratch / "out" / "cells.csv").read_text()
-        self.assertEqual([cells.count("\n%s/case/0," % name) for name in ("median", "mean", "inner")], [1, 1, 1], cells)
-        self.assertNotIn("failed", cells)
+        self.write("experiment.yaml", EXPERIMENT % case)
+        self.expect(0, "compare", "experiment.yaml", "--out", "out")
+        cells = self.rows()
+        self.assertEqual(sorted(cells), ["inner/case/0", "mean/case/0", "median/case/0"])
+        self.assertNotIn("failed", self.read("out/cells.csv"))
 
 
 if __name__ == "__main__":

@@ -2,13 +2,11 @@
 """The log of a run: levels on the terminal, every line in the file, events as JSON."""
 import json
 import os
-import pty
 import re
-import subprocess
-import unittest
 
 from harness import MARROW, TEST_PLUGINS
-from harness.program import Case, main, marrow
+from harness.program import SharedCase, main
+from harness.terminal import Terminal
 
 PIPELINE = """marrow: 1
 nodes:
@@ -21,20 +19,20 @@ outputs: {c: c, w: w, s: s, f: f}
 LINE = re.compile(r"\d{4}-\d{2}-\d{2} \d{2}:\d{2}:\d{2}\.\d{3} \[(debug|info|warning|error)\] (.*)")
 
 
-class Log(Case):
-    def setUp(self):
-        super().setUp()
-        self.path = self.write("p.yaml", PIPELINE)
-        self.runs = 0
+class Log(SharedCase):
+    def make(self):
+        self.write("p.yaml", PIPELINE)
+        self.runs = {}
 
     def run_with(self, *arguments):
-        self.runs += 1
-        out = self.scratch / ("out-%d" % self.runs)
-        result = marrow("run", self.path, "--out", out, "--no-cache", *arguments, plugins=[TEST_PLUGINS])
-        self.assertEqual(result.returncode, 1, result.stderr)
-        lines = [LINE.fullmatch(line) for line in (out / "log.txt").read_text().splitlines()]
-        self.assertNotIn(None, lines)
-        return result, [line.groups() for line in lines]
+        """The run with these options, and the lines of its log as (level, text). Each is made once."""
+        if arguments not in self.runs:
+            out = "out-%d" % len(self.runs)
+            result = self.expect(1, "run", "p.yaml", "--out", out, "--no-cache", *arguments)
+            lines = [LINE.fullmatch(line) for line in self.read(out + "/log.txt").splitlines()]
+            self.assertNotIn(None, lines)
+            self.runs[arguments] = result, [line.groups() for line in lines]
+        return self.runs[arguments]
 
     def test_the_least_level_that_is_shown(self):
         wanted = {"debug": "a trifle", "info": "a word", "warning": "warning: mind the gap", "error": "error: "}
@@ -48,53 +46,28 @@ class Log(Case):
 
     def test_the_file_has_every_line_with_level_and_node(self):
         lines = self.run_with("--quiet")[1]
-        self.assertIn(("debug", "s: a trifle"), lines)
-        self.assertIn(("info", "s: a word"), lines)
-        self.assertIn(("warning", "w: mind the gap"), lines)
-        errors = [text for level, text in lines if level == "error"]
-        self.assertEqual(len(errors), 1)
-        self.assertIn("node 'f'", errors[0])
+        for line in (("debug", "s: a trifle"), ("info", "s: a word"), ("warning", "w: mind the gap")):
+            self.assertIn(line, lines)
+        (error,) = (text for level, text in lines if level == "error")
+        self.assertIn("node 'f'", error)
 
     def test_as_json(self):
         result = self.run_with("--json")[0]
         events = [json.loads(line) for line in result.stdout.splitlines() if line.startswith('{"event"')]
-        said = {
-            (event["node"], event.get("level"), event["text"])
-            for event in events
-            if event["event"] in ("message", "warning")
-        }
+        events = [event for event in events if event["event"] in ("message", "warning")]
+        said = {(event["node"], event.get("level"), event["text"]) for event in events}
         self.assertEqual(said, {("s", "debug", "a trifle"), ("s", "info", "a word"), ("w", "warning", "mind the gap")})
 
     def test_an_unknown_level(self):
-        result = marrow("run", self.path, "--log-level", "loud", plugins=[TEST_PLUGINS])
-        self.assertEqual(result.returncode, 2)
-        self.assertIn("--log-level", result.stderr)
-        self.assertIn("loud", result.stderr)
+        self.refused(["--log-level", "loud"], "run", "p.yaml", "--log-level", "loud")
 
     def test_colours_on_a_terminal_only(self):
         self.assertNotIn("\x1b[", self.run_with()[0].stderr)
-        master, slave = pty.openpty()
-        environment = dict(os.environ, MARROW_PLUGIN_PATH=str(TEST_PLUGINS), TERM="xterm")
-        with subprocess.Popen(
-            [str(MARROW), "run", str(self.path), "--out", str(self.scratch / "coloured"), "--no-cache"],
-            env=environment,
-            stdout=subprocess.DEVNULL,
-            stderr=slave,
-        ) as process:
-            os.close(slave)
-            shown = b""
-            while True:
-                try:
-                    part = os.read(master, 4096)
-                except OSError:  # the other end is closed
-                    break
-                if not part:
-                    break
-                shown += part
-            process.wait(timeout=300)
-        os.close(master)
-        self.assertRegex(shown, rb"\x1b\[33m[^\n]*mind the gap")
-        self.assertNotIn("\x1b", (self.scratch / "coloured" / "log.txt").read_text())
+        environment = {**os.environ, "MARROW_PLUGIN_PATH": str(TEST_PLUGINS), "TERM": "xterm"}
+        command = [MARROW, "run", "p.yaml", "--out", "coloured", "--no-cache"]
+        with Terminal(command, cwd=self.scratch, environment=environment) as terminal:
+            self.assertRegex(terminal.to_the_end(), r"\x1b\[33m[^\n]*mind the gap")
+        self.assertNotIn("\x1b", self.read("coloured/log.txt"))
 
 
 if __name__ == "__main__":

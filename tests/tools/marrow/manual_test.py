@@ -6,29 +6,31 @@ import subprocess
 import unittest
 
 from harness import BUILD, SOURCE
-from harness.program import Case, main, marrow
+from harness.program import SharedCase, main
 
 VERSION = re.search(r"project\(marrow VERSION ([0-9.]+)", (SOURCE / "CMakeLists.txt").read_text()).group(1)
 
 
-class Manual(Case):
-    @classmethod
-    def setUpClass(cls):
-        cls.folder = cls.shared_folder() / "man"
-        done = marrow("manual", "--out", cls.folder)
-        assert done.returncode == 0, done.stderr
-        workbench = subprocess.run([BUILD / "bin" / "marrow-workbench", "manual", "--out", cls.folder])
-        assert workbench.returncode == 0
+class Manual(SharedCase):
+    def make(self):
+        self.folder = self.scratch / "man"
+        self.expect(0, "manual", "--out", self.folder)
+        subprocess.run([BUILD / "bin" / "marrow-workbench", "manual", "--out", self.folder], check=True)
+        self.helps = {}
+        self.add_help()
 
-    def commands(self, words=()):
-        """The words of each command, as the help names them."""
-        found, part = [list(words)], ""
-        for line in marrow(*words, "--help").stdout.splitlines():
+    def add_help(self, *words):
+        """Keeps the help of a command and of those below it, as (part, name, text) of each line."""
+        lines, part = [], ""
+        for line in self.printed(*words, "--help").splitlines():
             part = line if line.endswith(":") else part
-            match = re.match(r"  (\S+)", line)
-            if match and part == "Subcommands:" and not line.startswith("   "):
-                found += self.commands([*words, match.group(1)])
-        return found
+            match = re.match(r"  (\S+).*?(?:\s{2,}(\S.*))?$", line)
+            if match and not line.startswith("   "):
+                lines.append((part, match.group(1), match.group(2) or ""))
+        self.helps["-".join(["marrow", *words]) + ".1"] = lines
+        for part, name, _ in lines:
+            if part == "Subcommands:":
+                self.add_help(*words, name)
 
     def shown(self, page, *options):
         command = ["groff", "-man", "-Tutf8", "-P-cbou", "-ww", *options, page]
@@ -37,23 +39,19 @@ class Manual(Case):
         return done.stdout
 
     def test_a_page_for_each_command(self):
-        pages = {"-".join(["marrow", *words]) + ".1" for words in self.commands()}
-        self.assertEqual({path.name for path in self.folder.iterdir()}, pages)
-        self.assertIn("marrow-cache-gc.1", pages)
+        self.assertEqual({path.name for path in self.folder.iterdir()}, set(self.helps))
+        self.assertIn("marrow-cache-gc.1", self.helps)
 
     @unittest.skipUnless(shutil.which("groff"), "groff is not installed")
     def test_each_option_with_its_help(self):
-        for words in self.commands():
-            page = self.folder / ("-".join(["marrow", *words]) + ".1")
-            text = " ".join(self.shown(page, "-rLL=500n").split()).replace("‐", "-").replace("−", "-")
+        for page, lines in self.helps.items():
+            shown = self.shown(self.folder / page, "-rLL=500n")
+            text = " ".join(shown.split()).replace("‐", "-").replace("−", "-")
             self.assertIn("marrow %s" % VERSION, text)
-            part = ""
-            for line in marrow(*words, "--help").stdout.splitlines():
-                part = line if line.endswith(":") else part
-                match = re.match(r"  (\S+).*?(?:\s{2,}(\S.*))?$", line)
-                if match and part in ("Options:", "Positionals:") and not line.startswith("   "):
-                    self.assertIn(match.group(1).split("=")[0].replace(",", ", "), text, page.name)
-                    self.assertIn(" ".join((match.group(2) or "").split()), text, page.name)
+            for part, name, said in lines:
+                if part in ("Options:", "Positionals:"):
+                    self.assertIn(name.split("=")[0].replace(",", ", "), text, page)
+                    self.assertIn(" ".join(said.split()), text, page)
 
     @unittest.skipUnless(shutil.which("groff"), "groff is not installed")
     def test_what_holds_for_all(self):
@@ -64,9 +62,8 @@ class Manual(Case):
 
     @unittest.skipUnless(shutil.which("lexgrog"), "man-db is not installed")
     def test_apropos_finds_each(self):
-        done = subprocess.run(
-            ["lexgrog", *sorted(self.folder.iterdir())], capture_output=True, text=True, env={"LC_ALL": "C.UTF-8"}
-        )
+        command = ["lexgrog", *sorted(self.folder.iterdir())]
+        done = subprocess.run(command, capture_output=True, text=True, env={"LC_ALL": "C.UTF-8"})
         self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
         self.assertIn("marrow-plan - show what a run would compute", done.stdout)
 

@@ -18,16 +18,12 @@ def mutated(text, chance):
     line = lines[at]
     column = chance.randrange(len(line))
     kind = chance.randrange(5)
-    if kind == 0:
-        line = line[:column] + chance.choice("abcxyz019.:{}[],\"'$&*!%@ ") + line[column:]
-    elif kind == 1:
-        line = line[:column] + line[column + 1 :]
-    elif kind == 2:
-        line = line[:column] + chance.choice("abcxyz019.:{}[],\"'$&*!%@ ") + line[column + 1 :]
-    elif kind == 3:
-        line = line[:column] + line[column:][::-1]
-    else:
+    other = chance.choice("abcxyz019.:{}[],\"'$&*!%@ ") if kind in (0, 2) else ""
+    if kind == 4:
         lines.insert(at, line)
+    else:
+        head, tail = line[:column], line[column:]
+        line = head + (other + tail, tail[1:], other + tail[1:], tail[::-1])[kind]
     lines[at] = line
     return "\n".join(lines) + "\n", at + 1
 

@@ -1,18 +1,18 @@
 # SPDX-License-Identifier: Apache-2.0
 """Networks as nodes, by marrow run: a model exported by PyTorch gives PyTorch's values, both of its files count in the
 node's key, and a model that is damaged, hostile or described wrongly ends in a sentence of that node."""
-import json
+import copy
 import random
 import re
 import shutil
 import subprocess
-import unittest
 
 import numpy
 import yaml
+from PIL import Image
+
 from harness import formats, onnx
 from harness.program import Case, main
-from PIL import Image
 
 PIPELINE = """marrow: 1
 nodes:
@@ -63,23 +63,33 @@ numpy.save("expected.npy", torch.softmax(net(image), 1)[0, 1].detach().numpy())
 """
 
 
-def has_torch():
-    return subprocess.run(["/usr/bin/python3", "-c", "import torch, onnx"], capture_output=True).returncode == 0
+COPIES = 300
+MAY_FAIL = """  masked%d:
+    uses: mask.network
+    may_fail: true
+    in: {view: image}
+    with: {network: damaged/net%d.yaml, leave_out: [metal]}"""
 
 
-def read_png(path):
-    """Grey values of a PNG of 8 bits."""
-    with Image.open(path) as picture:
-        return numpy.asarray(picture)
-
-
-def bytes_of(weights=(1.0, -1.0), bias=(0.0, 0.0), outputs=(2, ROWS, COLUMNS), rows=ROWS, columns=COLUMNS, layers=()):
-    """A network of one convolution of 1 x 1 pixels, and further layers."""
+def bytes_of(weights=(1.0, -1.0), bias=(0.0, 0.0), outputs=(2, ROWS, COLUMNS)):
+    """A network of one convolution of 1 x 1 pixels."""
     layer, tensors = onnx.convolution("image", "maps", [[[[weight]]] for weight in weights], list(bias))
-    return onnx.model([layer, *layers], tensors, {"maps": outputs}, rows, columns)
+    return onnx.model([layer], tensors, {"maps": outputs}, ROWS, COLUMNS)
+
+
+def changed(value, *place):
+    """The description with another value, at a place such as "input", "size_px"."""
+    card = copy.deepcopy(CARD)
+    part = card
+    for key in place[:-1]:
+        part = part[key]
+    part[place[-1]] = value
+    return card
 
 
 class Networks(Case):
+    plugins = []
+
     def setUp(self):
         super().setUp()
         self.image = numpy.random.default_rng(1).normal(0.5, 0.3, (80, 96)).astype(numpy.float32)
@@ -89,49 +99,40 @@ class Networks(Case):
 
     def write_image(self, values):
         grid = formats.straight((values.shape[1], values.shape[0], 1))
-        (self.scratch / "image.mha").write_bytes(formats.mha(grid, values.ravel(), "MET_FLOAT"))
+        self.write("image.mha", formats.mha(grid, values.ravel(), "MET_FLOAT"))
 
-    def put(self, model, card=CARD):
+    def put(self, model=None, card=CARD):
         """Writes the two files; without a model only the description."""
         if model is not None:
-            (self.scratch / "net.onnx").write_bytes(model)
-        self.write("net.yaml", card if isinstance(card, str) else yaml.safe_dump(card))
+            self.write("net.onnx", model)
+        self.write("net.yaml", yaml.safe_dump(card))
 
-    def run_it(self, *more):
+    def run_it(self, *more, code=0):
         shutil.rmtree(self.scratch / "out", ignore_errors=True)
-        return self.marrow("run", "pipeline.yaml", "--out", "out", *more)
+        return self.expect(code, "run", "pipeline.yaml", "--out", "out", *more)
 
     def mask(self, probability, *more):
-        ran = self.run_it("--set", "masked.probability=%.7f" % probability, *more)
-        self.assertEqual(ran.returncode, 0, ran.stderr)
-        return read_png(self.scratch / "out/outputs/view/mask.png") == 0
+        self.run_it("--set", "masked.probability=%.7f" % probability, *more)
+        with Image.open(self.scratch / "out/outputs/view/mask.png") as picture:
+            return numpy.asarray(picture) == 0
 
-    def refused(self, model, card=CARD):
+    def refused_by_node(self, model=None, card=CARD):
         """What the run says of the node."""
         self.put(model, card)
-        ran = self.run_it()
-        self.assertEqual(ran.returncode, 1, ran.stderr + ran.stdout)
-        self.assertNotRegex(ran.stderr, r"(?i)signal|core dumped|terminate called|traceback")
-        return ran.stderr
-
-    def changed(self, place, value):
-        """The description with another value, at a place such as ("input", "size_px")."""
-        card = json.loads(json.dumps(CARD))
-        part = card
-        for key in place[:-1]:
-            part = part[key]
-        part[place[-1]] = value
-        return card
+        told = self.run_it(code=1).stderr
+        self.assertNotRegex(told, r"(?i)signal|core dumped|terminate called|traceback")
+        self.assertIn("masked", told, "the node is named")
+        return told
 
     def test_a_model_of_pytorch_gives_its_values(self):
-        if not has_torch():
+        if subprocess.run(["/usr/bin/python3", "-c", "import torch, onnx"], capture_output=True).returncode:
             self.skipTest("PyTorch is not installed (python3-torch, python3-onnx)")
         image = self.image[:ROWS, :COLUMNS]
         self.write_image(image)
         numpy.save(self.scratch / "image.npy", image)
         subprocess.run(["/usr/bin/python3", "-c", TRAINS], cwd=self.scratch, check=True, capture_output=True)
         expected = numpy.load(self.scratch / "expected.npy")
-        self.put(None, self.changed(("input", "overlap_px"), 0))
+        self.put(None, changed(0, "input", "overlap_px"))
         self.assertGreater(expected.max() - expected.min(), 0.2)
         size = ["--set", "seen.width_px=%d" % COLUMNS, "--set", "seen.height_px=%d" % ROWS]
         # A mask says of each pixel whether the value is above the threshold.
@@ -142,70 +143,33 @@ class Networks(Case):
             numpy.testing.assert_array_equal(above[sure], expected[sure] > threshold)
 
     def test_both_files_count_in_the_key(self):
-        def computed():
-            """Whether a run computes the node, or reads its result back."""
-            ran = self.run_it()
-            self.assertEqual(ran.returncode, 0, ran.stderr)
-            nodes = json.loads((self.scratch / "out/run.json").read_text())["nodes"]
-            (masked,) = (node for node in nodes if node["id"] == "masked")
-            self.assertEqual(masked["calls"] + masked["cached"], 1)
-            return masked["calls"] == 1
-
-        self.assertTrue(computed())
-        self.assertFalse(computed())
-        self.put(bytes_of(weights=(1.0, -1.0000001)))
-        self.assertTrue(computed(), "a bit of the ONNX file")
-        self.put(None, self.changed(("version",), "1.0.1"))
-        self.assertTrue(computed(), "a character of the description")
-        self.put(bytes_of())
-        self.assertFalse(computed(), "as in the first run")
+        for model, card, is_computed, why in (
+            (None, CARD, True, "never before"),
+            (None, CARD, False, "as before"),
+            (bytes_of(weights=(1.0, -1.0000001)), CARD, True, "a bit of the ONNX file"),
+            (None, changed("1.0.1", "version"), True, "a character of the description"),
+            (bytes_of(), CARD, False, "as in the first run"),
+        ):
+            self.put(model, card)
+            self.run_it()
+            masked = self.nodes()["masked"]
+            self.assertEqual((masked["calls"], masked["cached"]), (1, 0) if is_computed else (0, 1), why)
 
     def test_the_same_bytes_at_any_number_of_threads(self):
-        masks = []
-        for threads in (1, 3):
-            masks.append(self.mask(0.4, "--threads", threads, "--no-cache"))
+        masks = [self.mask(0.4, "--threads", threads, "--no-cache") for threads in (1, 3)]
         numpy.testing.assert_array_equal(*masks)
         self.assertTrue(0.1 < masks[0].mean() < 0.9)
 
-    def test_models_that_cannot_be(self):
-        good = bytes_of()
-        unknown = onnx.node("Bogus", ["maps"], "others")
-        for model, card, said in [
-            (b"", CARD, "net.onnx: the file is empty"),
-            (b"no model at all", CARD, "net.onnx: is no ONNX model, or a damaged one; export it again"),
-            (good[: len(good) // 2], CARD, "net.onnx: is no ONNX model, or a damaged one; export it again"),
-            (bytes_of(layers=[unknown]), CARD, "cannot compute its layer 'others_layer' of the type Bogus; export the"),
-            (good, self.changed(("outputs", "classes", "layer"), "map"), "has no output 'map', which net.yaml names;"),
-            (
-                bytes_of(weights=(1.0, 1.0, 1.0), bias=(0, 0, 0)),
-                CARD,
-                "output 'maps' has the shape 1 x 3 x 48 x 64, but net.yaml describes 1 x 2 x 48 x 64",
-            ),
-            (bytes_of(weights=(float("nan"), 1.0)), CARD, "has values that are not finite (NaN or infinity)"),
-        ]:
-            with self.subTest(said):
-                told = self.refused(model, card)
-                self.assertIn(said, told)
-                self.assertIn("masked", told, "the node is named")
-
-    def test_a_model_that_declares_huge_sizes(self):
-        convolution, _ = onnx.convolution("image", "maps", [[[[1.0]]], [[[1.0]]]], [0, 0])
-        for side in (1 << 20, 1 << 31, (1 << 62) + 1):
-            weights, bias = onnx.tensor("maps_w", [side, 1, 1, 1], [0] * 4), onnx.tensor("maps_b", [2], [0, 0])
-            self.refused(onnx.model([convolution], [weights, bias], {"maps": (2, side, side)}, side, side))
-
-    def test_a_file_that_is_missing(self):
-        (self.scratch / "net.onnx").unlink()
-        ran = self.run_it()
-        self.assertEqual(ran.returncode, 1)
-        self.assertIn("net.onnx", ran.stderr)
-
-    def test_a_description_with_many_faults_names_all(self):
-        card = self.changed(("input", "bone"), "white")
+    def test_a_model_or_a_description_that_cannot_be(self):
+        """tests/plugins/toolbox/network has the other faults of each."""
+        told = self.refused_by_node(bytes_of(weights=(1.0, 1.0, 1.0), bias=(0, 0, 0)))
+        shape = "output 'maps' has the shape 1 x 3 x 48 x 64, but net.yaml describes 1 x 2 x 48 x 64"
+        self.assertIn(shape, told)
+        card = changed("white", "input", "bone")
         card["input"]["size_px"] = [48, 2]
         card["outputs"]["classes"]["names"] = ["metal", "metal"]
         del card["licence"]
-        told = self.refused(bytes_of(), card)
+        told = self.refused_by_node(bytes_of(), card)
         for said in (
             "expected bright, dark; got 'white'",
             "whole numbers of rows and columns, 8 to 4096, got 2",
@@ -213,35 +177,33 @@ class Networks(Case):
             "licence",
         ):
             self.assertIn(said, told)
+        (self.scratch / "net.onnx").unlink()
+        self.assertIn("net.onnx", self.refused_by_node())
 
-    COPIES = 300
-    MAY_FAIL = """  masked%d:
-    uses: mask.network
-    may_fail: true
-    in: {view: image}
-    with: {network: damaged/net%d.yaml, leave_out: [metal]}"""
+    def test_a_model_that_declares_huge_sizes(self):
+        convolution, _ = onnx.convolution("image", "maps", [[[[1.0]]], [[[1.0]]]], [0, 0])
+        for side in (1 << 20, 1 << 31, (1 << 62) + 1):
+            weights, bias = onnx.tensor("maps_w", [side, 1, 1, 1], [0] * 4), onnx.tensor("maps_b", [2], [0, 0])
+            self.refused_by_node(onnx.model([convolution], [weights, bias], {"maps": (2, side, side)}, side, side))
 
     def test_damaged_models_are_refused_or_computed(self):
         """Bytes that change at random: no crash ends the run otherwise than by a sentence of the node."""
         good, draw = bytes_of(), random.Random(5)
-        (self.scratch / "damaged").mkdir()
-        nodes, outputs = [], []
-        for i in range(self.COPIES):
+        for i in range(COPIES):
             model = bytearray(good)
             for _ in range(draw.choice([1, 1, 2, 8])):
                 model[draw.randrange(len(model))] = draw.randrange(256)
-            (self.scratch / ("damaged/net%d.onnx" % i)).write_bytes(model)
+            self.write("damaged/net%d.onnx" % i, bytes(model))
             self.write("damaged/net%d.yaml" % i, yaml.safe_dump(CARD))
-            nodes.append(self.MAY_FAIL % (i, i))
-            outputs.append("v%d: masked%d" % (i, i))
+        nodes = "\n".join(MAY_FAIL % (i, i) for i in range(COPIES))
+        outputs = ", ".join("v%d: masked%d" % (i, i) for i in range(COPIES))
         head = PIPELINE.split("  masked")[0]
-        self.write("pipeline.yaml", head + "\n".join(nodes) + "\noutputs: {%s}\n" % ", ".join(outputs))
-        ran = self.marrow("run", "pipeline.yaml", "--out", "out", "--no-cache", timeout=900)
-        self.assertEqual(ran.returncode, 0, ran.stderr[-2000:])
-        faults = re.findall(r"node '(masked\d+)' \(mask.network\) failed: (.*)", ran.stderr)
-        made = [i for i in range(self.COPIES) if (self.scratch / ("out/outputs/v%d" % i)).exists()]
-        self.assertEqual(len(faults) + len(made), self.COPIES)
-        self.assertGreater(len(faults), self.COPIES / 4)
+        self.write("pipeline.yaml", "%s%s\noutputs: {%s}\n" % (head, nodes, outputs))
+        told = self.expect(0, "run", "pipeline.yaml", "--out", "out", "--no-cache", timeout=900).stderr
+        faults = re.findall(r"node '(masked\d+)' \(mask.network\) failed: (.*)", told)
+        made = [i for i in range(COPIES) if (self.scratch / ("out/outputs/v%d" % i)).exists()]
+        self.assertEqual(len(faults) + len(made), COPIES)
+        self.assertGreater(len(faults), COPIES / 4)
         self.assertGreater(len(made), 0)
         for node, fault in faults:
             self.assertRegex(fault, r"net\d+\.(onnx|yaml): \S", "%s says which file is at fault" % node)

@@ -1,9 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """A pose that nobody judged is never silent: a part of a pipeline gives the verdicts of its poses, too."""
-import json
 import re
 
-from harness.program import Case, main, marrow
+from harness.program import Case, main
 
 POSE = """marrow-pose: 1
 target: world
@@ -49,41 +48,32 @@ class OnlyVerdicts(Case):
         self.write("found.yaml", POSE % (700, 1e-6, 1e-6, 1))
         self.write("other.yaml", POSE % (710, 1e-6, 1e-6, 1e-6))
 
-    def run_it(self, *arguments):
-        return marrow("run", *arguments, cwd=self.scratch)
-
-    def only(self, *names, code):
-        out = self.scratch / "-".join(names)
-        words = [word for name in names for word in ("--only", name)]
-        result = self.run_it("p.yaml", "--no-cache", "--out", out, *words)
-        self.assertEqual(result.returncode, code, result.stdout + result.stderr)
-        return result, json.loads((out / "run.json").read_text())
+    def only(self, name, code):
+        result = self.expect(code, "run", "p.yaml", "--no-cache", "--out", name, "--only", name)
+        return result, self.json(name + "/run.json").get("verdicts")
 
     def test_a_part_of_a_pipeline_ends_as_the_whole(self):
-        self.assertEqual(self.run_it("p.yaml", "--no-cache", "--out", "whole").returncode, 3)
+        whole = self.expect(3, "run", "p.yaml", "--no-cache", "--out", "whole")
+        self.assertEqual(re.findall("nobody judges the output '(.*)':", whole.stderr), ["other"])
         for name in ("found", "pose"):  # the second one has other deviations, and is judged by where it comes from
-            result, record = self.only(name, code=3)
+            result, verdicts = self.only(name, code=3)
             self.assertIn("\nverdict: WRONG (failure", result.stdout)
-            self.assertEqual([one["output"] for one in record["verdicts"]], ["verdict"])
+            self.assertEqual([one["output"] for one in verdicts], ["verdict"])
             self.assertNotIn("nobody judges", result.stderr)
             made = [path.name for path in (self.scratch / name / "outputs").iterdir()]
             self.assertEqual(sorted(made), sorted([name + ".yaml", "verdict.yaml"]))
 
     def test_a_pose_without_a_verdict_is_told(self):
-        result, record = self.only("other", code=0)
-        self.assertNotIn("verdicts", record)
-        self.assertIn(
-            "marrow: note: nobody judges the output 'other': this pipeline has no verdict on that pose\n", result.stderr
-        )
-        log = (self.scratch / "other" / "log.txt").read_text()
-        self.assertIn("nobody judges the output 'other'", log)
+        result, verdicts = self.only("other", code=0)
+        self.assertIsNone(verdicts)
+        note = "nobody judges the output 'other'"
+        self.assertIn("marrow: note: %s: this pipeline has no verdict on that pose\n" % note, result.stderr)
+        self.assertIn(note, self.read("other/log.txt"))
         self.assertNotIn("WRONG", result.stdout)
-        whole = self.run_it("p.yaml", "--no-cache", "--out", "whole")
-        self.assertEqual(re.findall("nobody judges the output '(.*)':", whole.stderr), ["other"])
 
     def test_what_needs_no_pose_needs_no_verdict(self):
-        result, record = self.only("bone", code=0)
-        self.assertNotIn("verdicts", record)
+        result, verdicts = self.only("bone", code=0)
+        self.assertIsNone(verdicts)
         self.assertNotIn("nobody judges", result.stderr)
 
 

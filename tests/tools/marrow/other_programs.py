@@ -5,7 +5,7 @@ import shutil
 import unittest
 import zlib
 
-from harness.program import Case, marrow
+from harness.program import Case
 
 
 def module(name):
@@ -15,8 +15,8 @@ def module(name):
         return None
 
 
-numpy, pydicom, nibabel, tifffile, PIL, vtk = map(
-    module, ("numpy", "pydicom", "nibabel", "tifffile", "PIL.Image", "vtkmodules.all")
+numpy, pydicom, nibabel, tifffile, PIL, vtk, h5py = map(
+    module, ("numpy", "pydicom", "nibabel", "tifffile", "PIL.Image", "vtkmodules.all", "h5py")
 )
 DICOM = pathlib.Path(pydicom.__file__).parent / "data" / "test_files" if pydicom else None
 
@@ -36,25 +36,46 @@ def read_mha(path):
     return numpy.frombuffer(body, dtype="<f4").reshape(size[::-1]), keys
 
 
+def pipeline_of(node, files, options="", may_fail=False):
+    """A pipeline that reads each of the files by a node of its own, n0, n1, ..."""
+    line = "  n%d: {uses: %s, with: {path: '%s'%s}%s}\n"
+    nodes = [line % (i, node, file, options, ", may_fail: true" * may_fail) for i, file in enumerate(files)]
+    outputs = ", ".join("n%d: n%d" % (i, i) for i in range(len(files)))
+    return "marrow: 1\nnodes:\n%soutputs: {%s}\n" % ("".join(nodes), outputs)
+
+
 class Reading(Case):
+    plugins = []
+
     def run_node(self, node, options, file):
-        pipeline = self.write(
-            "p.yaml",
-            "marrow: 1\nnodes:\n  it: {uses: %s, with: {path: '%s'%s}}\noutputs: {it: it}\n" % (node, file, options),
-        )
-        out = self.scratch / "out"
-        shutil.rmtree(out, ignore_errors=True)
-        return marrow("run", pipeline, "--out", out, "--quiet"), out / "outputs"
+        text = "marrow: 1\nnodes:\n  it: {uses: %s, with: {path: '%s'%s}}\noutputs: {it: it}\n" % (node, file, options)
+        self.write("p.yaml", text)
+        shutil.rmtree(self.scratch / "out", ignore_errors=True)
+        return self.marrow("run", "p.yaml", "--out", "out", "--quiet"), self.scratch / "out/outputs"
+
+    def read_all(self, node, files, options=""):
+        """What becomes of these files in one run: of each the path of what is written, or why it is refused."""
+        self.write("p.yaml", pipeline_of(node, files, options, may_fail=True))
+        shutil.rmtree(self.scratch / "out", ignore_errors=True)
+        self.expect(0, "run", "p.yaml", "--out", "out", "--quiet")
+        return self.outcomes(len(files))
+
+    def outcomes(self, count):
+        nodes = self.nodes()
+        written = {path.stem: path for path in (self.scratch / "out/outputs").iterdir()}
+        return [written.get("n%d" % i) or nodes["n%d" % i]["reason"] for i in range(count)]
+
+    def images(self, files, options=""):
+        return [numpy.array(PIL.open(path)) for path in self.read_all("read.image", files, options)]
+
+    def volumes(self, files, options=""):
+        return [read_mha(path) for path in self.read_all("read.volume", files, options)]
 
     def image(self, file, options=""):
-        result, out = self.run_node("read.image", options, file)
-        self.assertEqual(result.returncode, 0, "%s: %s" % (file, result.stderr))
-        return numpy.array(PIL.open(out / "it.png"))
+        return self.images([file], options)[0]
 
     def volume(self, file, options=""):
-        result, out = self.run_node("read.volume", options, file)
-        self.assertEqual(result.returncode, 0, "%s: %s" % (file, result.stderr))
-        return read_mha(out / "it.mha")
+        return self.volumes([file], options)[0]
 
     def refused(self, node, file, options=""):
         result, _ = self.run_node(node, options, file)

@@ -1,7 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
 """Which inputs a pipeline has: `marrow check` and `marrow inspect FILE.yaml` list them."""
-import json
-
 from harness.program import Case, main
 
 PIPELINE = """marrow: 1
@@ -40,19 +38,21 @@ PART_LINES = """  input models (mesh for each fragment; given by a pipeline that
 
 class PipelineInputs(Case):
     def told(self, *arguments):
-        result = self.marrow(*arguments)
-        self.assertEqual((result.returncode, result.stderr), (0, ""))
+        result = self.expect(0, *arguments)
+        self.assertEqual(result.stderr, "")
         return result.stdout
 
-    def test_check_lists_them(self):
+    def setUp(self):
+        super().setUp()
         self.write("p.yaml", PIPELINE)
+        self.write("part.yaml", PART)
+
+    def test_check_lists_them(self):
+        lines = "p.yaml: good; 2 nodes, 2 outputs\n" + LINES % self.scratch + "  note: nothing uses"
         said = self.told("check", "p.yaml", "other=x.yaml")
-        self.assertTrue(
-            said.startswith("p.yaml: good; 2 nodes, 2 outputs\n" + LINES % self.scratch + "  note: nothing uses"), said
-        )
+        self.assertTrue(said.startswith(lines), said)
 
     def test_inspect_lists_inputs_and_outputs(self):
-        self.write("p.yaml", PIPELINE)
         self.assertEqual(
             self.told("inspect", "p.yaml"),
             "listed\n  Reads a pose.\n\n"
@@ -61,45 +61,28 @@ class PipelineInputs(Case):
             "  output points (landmarks for each fragment): points in CT coordinates (mm), in pixels of views, and in "
             "world coordinates (mm)\n",
         )
-        self.write("part.yaml", PART)
-        self.assertEqual(
-            self.told("inspect", "part.yaml"),
-            "part\n\n" + PART_LINES + "  output obj (obj_file for each fragment): %s\n" % self.help_of("write.obj"),
+        obj = (
+            "  output obj (obj_file for each fragment): %s\n"
+            % self.json_of("inspect", "write.obj")["outputs"][0]["help"]
         )
-
-    def help_of(self, node):
-        return json.loads(self.told("inspect", node, "--json"))["outputs"][0]["help"]
+        self.assertEqual(self.told("inspect", "part.yaml"), "part\n\n" + PART_LINES + obj)
 
     def test_inspect_as_json(self):
-        self.write("p.yaml", PIPELINE)
-        said = json.loads(self.told("inspect", "p.yaml", "--json"))
+        said = self.json_of("inspect", "p.yaml")
         self.assertEqual((said["name"], said["help"]), ("listed", "Reads a pose."))
         self.assertEqual(said["inputs"][0], {"name": "pose", "type": "path", "help": "the file"})
         self.assertEqual(said["inputs"][4], {"name": "seed", "type": "integer", "help": "", "default": "7"})
-        self.assertEqual(
-            [(one["name"], one["type"], one["axes"]) for one in said["outputs"]],
-            [("found", "pose", []), ("points", "landmarks", ["fragment"])],
-        )
-        self.write("part.yaml", PART)
-        self.assertEqual(
-            json.loads(self.told("inspect", "part.yaml", "--json"))["inputs"],
-            [
-                {"name": "models", "type": "mesh", "help": "surfaces", "over": "fragment", "optional": False},
-                {"name": "ct", "type": "volume", "help": "", "optional": True},
-            ],
-        )
+        outputs = [(one["name"], one["type"], one["axes"]) for one in said["outputs"]]
+        self.assertEqual(outputs, [("found", "pose", []), ("points", "landmarks", ["fragment"])])
+        models = {"name": "models", "type": "mesh", "help": "surfaces", "over": "fragment", "optional": False}
+        ct = {"name": "ct", "type": "volume", "help": "", "optional": True}
+        self.assertEqual(self.json_of("inspect", "part.yaml")["inputs"], [models, ct])
 
     def test_faults(self):
-        self.write("p.yaml", PIPELINE)
-        result = self.marrow("inspect", "p.yaml", "--yaml")
-        self.assertEqual(
-            (result.returncode, result.stderr),
-            (2, "marrow: error: --yaml prints a snippet for a node, and 'p.yaml' is a pipeline\n"),
-        )
+        said = "marrow: error: --yaml prints a snippet for a node, and 'p.yaml' is a pipeline\n"
+        self.assertEqual(self.expect(2, "inspect", "p.yaml", "--yaml").stderr, said)
         self.write("bad.yaml", "marrow: 1\nnodes: {a: {uses: no.no}}\noutputs: {a: a}\n")
-        result = self.marrow("inspect", "bad.yaml")
-        self.assertEqual(result.returncode, 2)
-        self.assertIn("bad.yaml:2:19: error: unknown node 'no.no'", result.stderr)
+        self.refused("bad.yaml:2:19: error: unknown node 'no.no'", "inspect", "bad.yaml")
 
 
 if __name__ == "__main__":

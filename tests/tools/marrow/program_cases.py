@@ -25,15 +25,18 @@ class Programs(Case):
         return self.write("p.yaml", json.dumps(text, indent=1))
 
     def run_it(self, nodes, code=0, outputs=None, **more):
+        """Runs the pipeline; gives what is said."""
         shutil.rmtree(self.scratch / "out", ignore_errors=True)
-        result = self.marrow("run", self.pipeline(nodes, outputs), "--out", "out", "--quiet", **more)
-        self.assertEqual(result.returncode, code, result.stdout + result.stderr)
-        return result.stderr
+        return self.expect(code, "run", self.pipeline(nodes, outputs), "--out", "out", "--quiet", **more).stderr
 
-    def failure(self, command, inputs=None, kind="volume", nodes=None, **options):
-        told = self.run_it({**(nodes or {}), "it": self.node(kind, command, inputs, **options)}, code=1)
-        self.assertIn(" failed: ", told)
-        return told.split(" failed: ", 1)[1]
+    def failures(self, *nodes, sources=()):
+        """Why each of these nodes fails, in one run that goes on without them."""
+        named = {"n%d" % i: {**node, "may_fail": True} for i, node in enumerate(nodes)}
+        self.run_it({**dict(sources), **named}, outputs={name: name for name in named})
+        recorded = self.nodes()
+        return [recorded[name]["reason"] for name in named]
 
-    def kept(self, name):
-        return self.scratch / name
+    def expect_failures(self, *rows, sources=()):
+        """Rows of a node, and of what its failure says."""
+        for (_, said), told in zip(rows, self.failures(*(node for node, _ in rows), sources=sources)):
+            self.assertIn(said, told)
