@@ -61,9 +61,15 @@ def another_run_makes_all(store):
 
 
 class Case(unittest.TestCase):
-    """A test with a folder of its own; `plugins` are the folders of plugins that it uses besides the shipped ones."""
+    """A test with a folder of its own, in which it runs the program.
+
+    `plugins` are the folders of plugins that it uses besides the shipped ones, `environment` are further variables of
+    all its calls. Its store of results is its own too, or, without `has_own_store`, that of all tests of the process.
+    """
 
     plugins = [TEST_PLUGINS]
+    environment = {}
+    has_own_store = True
 
     @classmethod
     def shared_folder(cls):
@@ -74,32 +80,125 @@ class Case(unittest.TestCase):
 
     def setUp(self):
         self.scratch = pathlib.Path(tempfile.mkdtemp(prefix="marrow-cli-"))
+        self.addCleanup(shutil.rmtree, self.scratch, ignore_errors=True)
 
-    def tearDown(self):
-        shutil.rmtree(self.scratch, ignore_errors=True)
+    def variables(self):
+        store = {"MARROW_CACHE": str(self.scratch / "cache")} if self.has_own_store else {}
+        return {**store, **self.environment}
 
     def marrow(self, *arguments, extra_environment=None, **more):
-        """Runs the program in the test's folder, with a store of results of its own."""
-        environment = {"MARROW_CACHE": str(self.scratch / "cache"), **(extra_environment or {})}
+        """Runs the program in the test's folder."""
         usual = {"plugins": self.plugins, "cwd": self.scratch}
+        environment = {**self.variables(), **(extra_environment or {})}
         return marrow(*arguments, extra_environment=environment, **{**usual, **more})
+
+    def expect(self, status, *arguments, **more):
+        """The same, for a call that ends with this status."""
+        result = self.marrow(*arguments, **more)
+        self.assertEqual(result.returncode, status, result.stdout + result.stderr)
+        return result
+
+    def printed(self, *arguments, **more):
+        """What a call prints that succeeds."""
+        return self.expect(0, *arguments, **more).stdout
+
+    def json_of(self, *arguments, **more):
+        return json.loads(self.printed(*arguments, "--json", **more))
+
+    def refused(self, said, *arguments, status=2, **more):
+        """Fails for the reason `said`, a text or several, and gives all that is said."""
+        told = self.expect(status, *arguments, **more).stderr
+        for text in [said] if isinstance(said, str) else said:
+            self.assertIn(text, told)
+        return told
+
+    def refusals(self, *rows, status=2, **more):
+        """Each row: what is said, and the words of the command."""
+        for said, *words in rows:
+            with self.subTest(said, words=words):
+                self.refused(said, *words, status=status, **more)
+
+    def faults(self, *rows, command=("check",), file="p.yaml", status=2):
+        """What is wrong in a file: rows of its text, line, column, message and, if there is one, hint."""
+        for text, line, column, message, *hints in rows:
+            with self.subTest(message):
+                self.write(file, text)
+                places = ["%s:%d:%d: error: %s\n" % (file, line, column, message)]
+                self.refused(places + ["  hint: %s\n" % hint for hint in hints], *command, file, status=status)
+
+    def start(self, *arguments, **more):
+        """Starts the program in the test's folder and goes on."""
+        plugins = ":".join(map(str, self.plugins))
+        usual = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True, "cwd": self.scratch}
+        process = subprocess.Popen(
+            [str(MARROW), *map(str, arguments)],
+            env={**os.environ, "MARROW_PLUGIN_PATH": plugins, **self.variables()},
+            **{**usual, **more}
+        )
+        self.addCleanup(process.communicate)
+        self.addCleanup(process.kill)  # where the test ends before
+        return process
+
+    def write(self, name, content):
+        """A file of the test's folder; its folder is made too."""
+        path = self.scratch / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_bytes(content if isinstance(content, bytes) else content.encode())
+        return path
+
+    def read(self, name):
+        return (self.scratch / name).read_text()
+
+    def json(self, name):
+        return json.loads(self.read(name))
+
+    def json_lines(self, name):
+        return [json.loads(line) for line in self.read(name).splitlines()]
+
+    def csv(self, name):
+        with open(self.scratch / name, newline="") as stream:
+            return list(csv.DictReader(stream))
+
+    def metric(self, name):
+        """The value of a file of one metric."""
+        (metric,) = self.json(name)["metrics"]
+        return metric["value"]
+
+    def nodes(self, out="out"):
+        """What the record of a run says of its nodes."""
+        return {node["id"]: node for node in self.json(out + "/run.json")["nodes"]}
 
     def rows(self, out="out"):
         """The rows of a comparison's table by their cells."""
-        with open(self.scratch / out / "cells.csv", newline="") as stream:
-            return {row["cell"]: row for row in csv.DictReader(stream)}
+        return {row["cell"]: row for row in self.csv(out + "/cells.csv")}
 
     def answer(self, out="out"):
-        return json.loads((self.scratch / out / "comparison.json").read_text())
+        return self.json(out + "/comparison.json")
 
     def page_data(self, page="out/report.html"):
-        text = (self.scratch / page).read_text()
-        return json.loads(re.search(r'<script type="application/json" id="data">(.*?)</script>', text, re.S).group(1))
+        pattern = r'<script type="application/json" id="data">(.*?)</script>'
+        return json.loads(re.search(pattern, self.read(page), re.S).group(1))
 
-    def write(self, name, text):
-        path = self.scratch / name
-        path.write_text(text)
-        return path
+    def everything(self):
+        """The names of all that is in the test's folder."""
+        return sorted(str(path.relative_to(self.scratch)) for path in self.scratch.rglob("*"))
+
+
+class SharedCase(Case):
+    """All its tests look at one folder, which `make` fills before the first; what it keeps in `self`, they see."""
+
+    @classmethod
+    def setUpClass(cls):
+        super().setUpClass()
+        cls.scratch = cls.shared_folder()
+        first = cls()
+        first.make()
+        for name, value in vars(first).items():
+            if not name.startswith("_"):
+                setattr(cls, name, value)
+
+    def setUp(self):
+        pass
 
 
 def main():

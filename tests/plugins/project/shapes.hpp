@@ -4,8 +4,9 @@
 #include <Eigen/Geometry>
 #include <cmath>
 #include <functional>
-#include <marrow/domain/camera.hpp>
 #include <marrow/domain/mesh.hpp>
+
+#include "tests/harness/cameras.hpp"
 
 namespace shapes {
 
@@ -76,18 +77,7 @@ inline marrow::Mesh sphere(double radius_mm) {
   return mesh;
 }
 
-/// The standard simulated C-arm: 1000 mm from source to detector, 600 to the isocentre, 512 x 512 pixels of 0.586 mm.
-/// At angle 0 the source is in front of the patient; at 90 degrees on the right side.
-inline marrow::Camera c_arm(double angle_deg, int size_px = 512) {
-  marrow::Camera camera;
-  camera.width_px = camera.height_px = size_px;
-  const double focal_px = 1000 / (0.586 * 512 / size_px);
-  camera.intrinsics << focal_px, 0, 0.5 * (size_px - 1), 0, focal_px, 0.5 * (size_px - 1), 0, 0, 1;
-  const double a = marrow::radians(angle_deg);
-  camera.camera_from_world.rotation << std::cos(a), -std::sin(a), 0, 0, 0, -1, std::sin(a), std::cos(a), 0;
-  camera.camera_from_world.translation_mm = {0, 0, 600};
-  return camera;
-}
+using marrow::test::c_arm;
 
 /// Puts a model point at the isocentre.
 inline marrow::RigidTransform centred_at(const Eigen::Vector3d& model_mm) {
