@@ -6,6 +6,7 @@
 #include <random>
 
 #include "tests/framework/fixture.hpp"
+#include "tests/harness/message_of.hpp"
 
 namespace manifest_test {
 
@@ -92,12 +93,8 @@ std::string sealed(json document) {
 }
 
 void expect_refused(const std::string& text, const std::string& reason) {
-  try {
-    marrow::manifest_from_text(text);
-    ADD_FAILURE() << "believed: " << text.substr(0, 300);
-  } catch (const marrow::Error& error) {
-    EXPECT_NE(std::string(error.what()).find(reason), std::string::npos) << error.what();
-  }
+  const std::string said = marrow::test::message_of([&] { marrow::manifest_from_text(text); });
+  EXPECT_NE(said.find(reason), std::string::npos) << said << " of " << text.substr(0, 300);
 }
 
 void expect_refused(const std::function<void(json&)>& invent, const std::string& reason) {

@@ -14,7 +14,7 @@
 
 #include "marrow/base/process_state.hpp"
 #include "marrow/runtime/store/store.hpp"
-#include "tests/framework/fixture.hpp"
+#include "tests/framework/run_fixture.hpp"
 #include "tests/harness/message_of.hpp"
 
 namespace hostile_nodes_test {
@@ -26,11 +26,16 @@ using Status = marrow::NodeRecord::Status;
 std::string hostile(const std::string& how) { return "uses: test.hostile, with: {how: " + how + "}"; }
 const std::string kChanged = " was changed while it ran; a plugin must leave it as it is";
 
-class HostileNodes : public testing::Test {
+class HostileNodes : public run_fixture::RunTest {
  protected:
+  const marrow::Catalogue& catalogue() const override {
+    static const marrow::Catalogue catalogue(
+        {fs::path(MARROW_BINARY_DIR) / "tests" / "plugins", fs::path(MARROW_BINARY_DIR) / "tests" / "hostile_plugins"});
+    return catalogue;
+  }
   /// Six healthy nodes, with one of this declaration among them unless it is empty. With one thread they run in turn.
-  marrow::RunResult run(const std::string& bad, const std::string& output = "bad", int threads = 1) {
-    std::string nodes, outputs;
+  marrow::RunResult run_beside(const std::string& bad, const std::string& output = "bad", int threads = 1) {
+    std::string nodes = "  c: {uses: test.constant, with: {value: 5}}\n", outputs;
     for (const std::string number : {"1", "2", "3", "4", "5", "6"}) {
       nodes +=
           "  s" + number + ": {uses: test.sensitive, in: {a: c}, with: {number: " + number + "}, may_fail: true}\n";
@@ -38,42 +43,23 @@ class HostileNodes : public testing::Test {
       if (number == "3" && !bad.empty()) nodes += "  bad: {" + bad + ", in: {a: c}, may_fail: true}\n";
     }
     if (!bad.empty()) outputs += "bad: " + output;
-    marrow::Diagnostics diagnostics;
-    pipeline = marrow::read_pipeline(
-        scratch.write("p.yaml", "marrow: 1\nnodes:\n  c: {uses: test.constant, with: {value: 5}}\n" + nodes +
-                                    "outputs: {" + outputs + "}\n"),
-        {}, catalogue(), diagnostics);
-    EXPECT_TRUE(diagnostics.empty()) << diagnostics.text();
-    marrow::RunSettings settings;
     settings.threads = threads;
     settings.store = store ? &*store : nullptr;
-    return marrow::run_pipeline(pipeline, catalogue(), settings);
-  }
-  static const marrow::Catalogue& catalogue() {
-    static const marrow::Catalogue catalogue(
-        {fs::path(MARROW_BINARY_DIR) / "tests" / "plugins", fs::path(MARROW_BINARY_DIR) / "tests" / "hostile_plugins"});
-    return catalogue;
-  }
-  const marrow::NodeRecord& node(const marrow::RunResult& result, const std::string& id) const {
-    for (std::size_t i = 0; i < pipeline.nodes.size(); ++i)
-      if (pipeline.nodes[i].id == id) return result.nodes[i];
-    throw marrow::Error("there is no node " + id);
+    return run(nodes, outputs);
   }
   /// The content hashes of what the healthy nodes give. They may fail for this reason only.
   std::vector<marrow::Digest> healthy(const marrow::RunResult& result, const std::string& may_be = "") const {
     std::vector<marrow::Digest> digests;
     for (const char* id : {"s1", "s2", "s3", "s4", "s5", "s6"}) {
-      const marrow::NodeRecord& one = node(result, id);
+      const marrow::NodeRecord& one = record(result, id);
       EXPECT_EQ(one.reason, one.status == Status::done ? "" : may_be) << id;
       digests.push_back(one.status == Status::done ? one.outputs.at(0).key : marrow::Digest{});
     }
     return digests;
   }
 
-  runtime_fixture::Scratch scratch;
   std::optional<marrow::Store> store;
-  marrow::Pipeline pipeline;
-  const std::vector<marrow::Digest> right = healthy(run(""));
+  const std::vector<marrow::Digest> right = healthy(run_beside(""));
 };
 
 TEST_F(HostileNodes, EachFailsAlone) {
@@ -103,9 +89,9 @@ TEST_F(HostileNodes, EachFailsAlone) {
        "column "
        "1; a covariance is symmetric and has no negative eigenvalue"}};
   for (const auto& [bad, output, reason] : rows) {
-    const marrow::RunResult result = run(bad, output);
-    EXPECT_EQ(node(result, "bad").status, Status::failed_alone) << bad;
-    EXPECT_EQ(node(result, "bad").reason, reason) << bad;
+    const marrow::RunResult result = run_beside(bad, output);
+    EXPECT_EQ(record(result, "bad").status, Status::failed_alone) << bad;
+    EXPECT_EQ(record(result, "bad").reason, reason) << bad;
     EXPECT_EQ(healthy(result), right) << bad;
   }
   EXPECT_STREQ(setlocale(LC_ALL, nullptr), "C");
@@ -124,13 +110,13 @@ TEST_F(HostileNodes, WhatRanBesideThemIsRightOrFails) {
       {"working folder", "the working folder was changed to / while it ran; a plugin must leave it as it is"}};
   for (const auto& [how, reason] : rows) {
     store->collect(0);
-    const std::vector<marrow::Digest> beside = healthy(run(hostile(how), "bad", 4), reason);
+    const std::vector<marrow::Digest> beside = healthy(run_beside(hostile(how), "bad", 4), reason);
     for (std::size_t i = 0; i < right.size(); ++i) EXPECT_TRUE(beside[i] == right[i] || beside[i] == marrow::Digest{});
     EXPECT_EQ(std::count(beside.begin(), beside.end(), marrow::Digest{}) > 0, !reason.empty()) << how;
-    const marrow::RunResult again = run("");
+    const marrow::RunResult again = run_beside("");
     EXPECT_EQ(healthy(again), right) << how << ": nothing wrong is kept";
     for (std::size_t i = 0; i < right.size(); ++i)
-      EXPECT_EQ(node(again, "s" + std::to_string(i + 1)).cached, beside[i] == right[i]) << "else it is made anew";
+      EXPECT_EQ(record(again, "s" + std::to_string(i + 1)).cached, beside[i] == right[i]) << "else it is made anew";
   }
 }
 
@@ -138,7 +124,7 @@ TEST_F(HostileNodes, TheCallersSettingsAreNotThoseOfNodes) {
   fesetround(FE_UPWARD);
   cv::setNumThreads(3);
   cv::setUseOptimized(false);
-  const std::vector<marrow::Digest> made = healthy(run(""));
+  const std::vector<marrow::Digest> made = healthy(run_beside(""));
   EXPECT_EQ(fegetround(), FE_UPWARD) << "it is the caller's";
   fesetround(FE_TONEAREST);
   EXPECT_EQ(made, right);

@@ -34,7 +34,7 @@ std::shared_ptr<const T> right_function(const std::string& node, const std::stri
     marrow::node_test::Inputs inputs;
   };
   const auto kept = std::make_shared<const Kept>(Kept{made, inputs});
-  return {kept, &kept->function.as<T>()};
+  return {kept, &kept->function.template as<T>()};
 }
 
 /// How often it was called, for nodes that do not give the same each time.
