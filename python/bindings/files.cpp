@@ -4,7 +4,6 @@
 #include "marrow/base/process_state.hpp"
 #include "marrow/base/reason_of_exception.hpp"
 #include "marrow/runtime/pipeline/pipeline.hpp"
-#include "marrow/runtime/process/plugin_code.hpp"
 #include "pipelines.hpp"
 #include "values.hpp"
 
@@ -34,7 +33,6 @@ void write_value(const py::object& object, const std::string& file) {
   const py::gil_scoped_release release;
   writer_of(*known, value.type);
   const WriterDefinition& definition = known->load_writer(value.type);
-  const PluginCode code("the writer of " + file);
   try {
     ProcessState::of_runs()->keep_during([&] { definition.write(value.data.get(), file); });
   } catch (...) {

@@ -18,7 +18,6 @@
 #include "marrow/base/framework_file.hpp"
 #include "marrow/base/process_state.hpp"
 #include "marrow/base/process_tree.hpp"
-#include "marrow/base/thread_state.hpp"
 #include "marrow/runtime/plugins/library.hpp"
 #include "marrow/runtime/plugins/linked_libraries.hpp"
 #include "marrow/runtime/plugins/trust.hpp"

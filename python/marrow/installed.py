@@ -5,7 +5,7 @@ import re
 import site
 import sys
 import sysconfig
-from typing import Dict, List, Set, Tuple
+from typing import Dict, List, Set
 
 _STANDARD_PATHS = [sysconfig.get_paths()[key] for key in ("stdlib", "platstdlib")]
 _STANDARD = {folder for path in _STANDARD_PATHS for folder in (os.path.abspath(path), os.path.realpath(path))}
@@ -77,13 +77,6 @@ def setup_files() -> List[str]:
             found += [os.path.join(folder, name) for name in os.listdir(folder) if name.endswith(".pth")]
     settings = [os.path.join(folder, "pyvenv.cfg") for folder in _folders_of_interpreter()]
     return [path for path in found + settings if os.path.isfile(path)]
-
-
-def setup_folders() -> List[Tuple[str, str]]:
-    """Where such files may appear, and their names. A folder of installed modules may itself appear."""
-    places = [(folder, "*.pth") for folder in _site_folders()]
-    places += [os.path.split(folder) for folder in _site_folders()]
-    return places + [(folder, "pyvenv") for folder in _folders_of_interpreter()]
 
 
 def _folders_of_interpreter() -> List[str]:

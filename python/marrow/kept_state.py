@@ -3,8 +3,6 @@
 import contextlib
 from typing import Iterator
 
-import numpy
-
 from . import _core
 
 
@@ -14,11 +12,7 @@ class KeptState:
     def __init__(self) -> None:
         self._before_import = ""
         self._imports = 0
-        self._take()
-
-    def _take(self) -> None:
         self._process = _core.ProcessState()
-        self._numpy = numpy.geterr()
 
     def begin(self) -> None:
         """A call begins: numbers are calculated with as usual, whatever ran before."""
@@ -28,24 +22,18 @@ class KeptState:
     def importing(self) -> Iterator[None]:
         """While a module runs for the first time. What it changes is no fault of the call, and stays."""
         if self._imports == 0:
-            self._before_import = self._before_import or self._put_back()
+            self._before_import = self._before_import or self._process.put_back()
         self._imports += 1
         try:
             yield
         finally:
             self._imports -= 1
             if self._imports == 0:
-                self._take()
+                self._process = _core.ProcessState()
                 self.begin()
 
     def changed(self) -> str:
         """What the call has changed, in words; an empty text if it has left all as it was."""
-        changed = self._before_import or self._put_back()
+        changed = self._before_import or self._process.put_back()
         self._before_import = ""
-        return changed
-
-    def _put_back(self) -> str:
-        changed: str = self._process.put_back()
-        if not changed and numpy.geterr() != self._numpy:
-            changed = "numpy's treatment of faults in calculations was changed"
         return changed

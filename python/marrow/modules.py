@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The files that a node written in Python depends on, and the folders in which its modules are looked for."""
+"""The files that a node written in Python depends on."""
 import ast
 import importlib.machinery
 import importlib.util
@@ -7,13 +7,11 @@ import os
 import pathlib
 import sys
 from types import CodeType, ModuleType
-from typing import Any, Dict, FrozenSet, Iterable, Iterator, List, Optional, Set, Tuple
+from typing import Any, Iterable, List, Set
 
 from . import _core
-from .installed import is_installed, is_standard, metadata_files, setup_files, setup_folders
+from .installed import is_installed, is_standard, metadata_files, setup_files
 from .trust import existing
-
-_STANDARD_NAMES: FrozenSet[str] = getattr(sys, "stdlib_module_names", frozenset())
 
 
 class _FromSource(importlib.machinery.SourceFileLoader):
@@ -66,55 +64,6 @@ def loaded_files(file: str) -> List[str]:
     return sorted(found)
 
 
-def searched_folders(places: Dict[str, List[str]], file: str) -> List[Tuple[str, List[str]]]:
-    """The folders in which modules were looked for, or will be in a call, each with the names of the modules: those
-    that are not there, and those that would be another file if one appeared in the folder."""
-    found: Dict[str, Set[str]] = {os.path.abspath(place): set() for place in sys.path}
-    looked_for = {name: list(sys.path) for name in _STANDARD_NAMES}
-    looked_for.update({name.partition(".")[0]: list(sys.path) for name in _names_in_own_files(file)})
-    looked_for.update(places)
-    for name, folders in looked_for.items():
-        here = _place_of(name)
-        for folder in [os.path.abspath(one) for one in folders] if here is not None else []:
-            if not is_standard(folder + os.sep):
-                found.setdefault(folder, set()).add(name.rpartition(".")[2])
-            if folder == here or (name in _STANDARD_NAMES and is_standard(folder + os.sep)):
-                break
-    for place, name in _places_in_own_folder(file):
-        found.setdefault(place, set()).add(name)
-    for place, name in setup_folders():
-        found.setdefault(place, set()).add(name)
-    for place in _portions():
-        found.setdefault(place, set()).add("__init__")
-    first = [os.path.abspath(place) for place in sys.path]
-    order = list(dict.fromkeys(first)) + sorted(set(found) - set(first))
-    return [(place, sorted(found[place])) for place in order]
-
-
-def _portions() -> Iterator[str]:
-    """The folders of packages without __init__.py, which would be others if one had it."""
-    for module in list(sys.modules.values()):
-        if getattr(module, "__file__", None) is None:
-            for folder in list(getattr(module, "__path__", None) or []):
-                if isinstance(folder, str) and os.path.isdir(folder) and not is_standard(folder + os.sep):
-                    yield os.path.abspath(folder)
-
-
-def _place_of(name: str) -> Optional[str]:
-    """The folder in which a module was found; "" if it is not loaded from one folder. None if no folder counts, because
-    the module is a part of the interpreter."""
-    module = sys.modules.get(name)
-    if getattr(getattr(module, "__spec__", None), "origin", None) in ("built-in", "frozen"):
-        return None
-    if module is None and name in sys.builtin_module_names:
-        return None
-    path = getattr(module, "__file__", None)
-    if not isinstance(path, str):
-        return ""
-    folder = os.path.dirname(os.path.abspath(path))
-    return os.path.dirname(folder) if hasattr(module, "__path__") else folder
-
-
 def _own_files(file: str) -> Iterable[pathlib.Path]:
     """Modules of the file's folder that it imports anywhere in its text, and those that these import."""
     folder = pathlib.Path(file).parent
@@ -127,21 +76,6 @@ def _own_files(file: str) -> Iterable[pathlib.Path]:
                     found.append(path)
                     todo.append(path)
     return found
-
-
-def _names_in_own_files(file: str) -> Set[str]:
-    return {name for path in (pathlib.Path(file), *_own_files(file)) for name in _imports(path) if name}
-
-
-def _places_in_own_folder(file: str) -> Iterator[Tuple[str, str]]:
-    """Where the parts of packages in the file's folder are looked for, and their names."""
-    for name in _names_in_own_files(file):
-        place = pathlib.Path(file).parent
-        for part in name.split("."):
-            if not place.is_dir():
-                break
-            yield str(place), part
-            place = place / part
 
 
 def _imports(file: pathlib.Path) -> List[str]:

@@ -22,7 +22,7 @@ from .errors import Error
 from .explained import explained
 from .items import Items
 from .kept_state import KeptState
-from .modules import import_from_source, loaded_files, searched_folders
+from .modules import import_from_source, loaded_files
 from .trust import TrustedModules
 
 _MADE = 3  # the descriptor through which values are handed over
@@ -33,9 +33,8 @@ _LONGEST_LINE = 60_000_000  # marrow reads no longer ones
 
 
 class Process:
-    def __init__(self, file: str, places: Dict[str, List[str]], say: Callable[[Dict[str, Any]], None]) -> None:
+    def __init__(self, file: str, say: Callable[[Dict[str, Any]], None]) -> None:
         self.file = file
-        self.places = places  # of each module that was looked for, the folders
         self.say = say
         self.nodes: Optional[Dict[str, Declaration]] = None
         self.inputs: Dict[int, Any] = {}  # by the number of their memory, each with a check that it is as it was
@@ -44,7 +43,7 @@ class Process:
         self.instead: Optional[functions.Instead] = None
         self.asking = threading.Lock()  # held from a question to its reply, but for what marrow asks meanwhile
         self.made: Optional[Any] = None
-        self.reported: Any = None  # how much was loaded and looked for when it was last reported
+        self.reported: Any = None  # how much was loaded when it was last reported
         self.context: Optional[Context] = None
         self.state: Optional[KeptState] = None  # from the first call on
         self.is_spoilt = False  # a call has changed the state of the process
@@ -228,16 +227,11 @@ class Process:
                     )
 
     def _loaded(self) -> Dict[str, Any]:
-        """What was loaded and looked for until now. Nothing where this is as in the last answer."""
-        now = len(sys.modules), len(self.places), _core.count_of_loaded_libraries()
-        if now == self.reported:
-            return {"files": [], "searched": []}
+        """The files that were loaded until now. None where they are as in the last answer."""
+        now = len(sys.modules), _core.count_of_loaded_libraries()
+        files = loaded_files(self.file) if now != self.reported else []
         self.reported = now
-        searched = searched_folders(self.places, self.file)
-        return {
-            "files": [_bytes_as_json(path) for path in loaded_files(self.file)],
-            "searched": [{"path": _bytes_as_json(path), "names": names} for path, names in searched],
-        }
+        return {"files": [_bytes_as_json(path) for path in files]}
 
 
 def _numbers_in(given: Any) -> List[int]:
@@ -357,13 +351,12 @@ def answer(process: Process, request: Dict[str, Any], answers: Answers) -> Dict[
         return {"failed": explained(error, process.file)}
 
 
-def main(arguments: List[str], places: Dict[str, List[str]]) -> int:
-    """`places` has, for each module that was looked for, the folders. It goes on to grow."""
+def main(arguments: List[str]) -> int:
     answers, requests = Answers(), Requests()
     for descriptor in (_MADE, _REPLIES):
         if _is_open(descriptor):
             os.set_inheritable(descriptor, False)
-    process = Process(arguments[0], places, answers.send)
+    process = Process(arguments[0], answers.send)
     own = os.getpid()
     _core.end_with(int(os.environ.get("MARROW_PARENT", os.getppid())))
 

@@ -10,7 +10,7 @@ from harness.package import MARROW, main, marrow, wait_until
 from written_nodes import Written, processes, view
 
 NODES = """
-import ctypes, os, signal, subprocess, sys, time
+import ctypes, locale, os, signal, subprocess, sys, time
 
 def figures(**values):
     return marrow.Metrics({"process": os.getpid(), **values})
@@ -45,6 +45,11 @@ def waits(camera: Annotated[Optional[marrow.Camera], "none"] = None, *, mark: An
     open(mark, "w")
     time.sleep(1000)
 """
+CHANGES = {
+    "locale.setlocale(locale.LC_ALL, 'C')": "the locale was changed",
+    "os.chdir('/')": "the working folder was changed to /",
+    "signal.signal(signal.SIGUSR1, signal.SIG_IGN)": "the handling of a signal was changed",
+}
 TAKE = "kept = [bytearray(b'x' * 50_000_000) for i in range(10)]"
 
 
@@ -72,24 +77,34 @@ class Hostile(Written):
         self.assertEqual((made["read"], made["by_a_child"], made["by_a_shell"]), (0, 0, 0))
         self.assertEqual(self.does("")["process"], first)
 
-    def test_what_a_call_changes_beside_an_import_is_its_failure(self):
-        for change in ("os.chdir('/')", "os.environ['ZZZ'] = '1'", "numpy.seterr(all='raise')"):
-            said = self.failure("import numpy\n%s\nimport %s" % (change, "colorsys"))
-            self.assertIn("was changed", said)
-            said = self.failure("import numpy\nimport %s\n%s" % ("sched", change))
-            self.assertIn("was changed", said)
+    def test_what_a_call_changes_is_its_failure(self):
+        state = (
+            "import numpy\n"
+            "made['folder'], made['least'] = len(os.getcwd()), float(numpy.float64(5e-324) / 1)\n"
+            "made['text'], made['default'] = sum(locale.setlocale(locale.LC_ALL).encode()), "
+            "signal.getsignal(signal.SIGUSR1) == signal.SIG_DFL\n"
+        )
+        before = {**self.does(state), "process": 0}
+        for change, what in CHANGES.items():
+            for code in (change, "%s\nimport colorsys" % change, "import sched\n%s" % change):
+                said = self.failure(code)
+                self.assertIn(what + " while it ran; a node must leave it as it is", said)
+                self.assertEqual({**self.does(state), "process": 0}, before)
 
     def test_what_a_module_changes_at_its_import_is_no_failure_of_the_call(self):
-        (self.scratch / "plugins" / "sets.py").write_text("import os\nos.environ['OF_A_MODULE'] = '1'\n")
-        made = self.does("import sets\nmade['set'] = int(os.environ['OF_A_MODULE'])")
-        self.assertEqual(made["set"], 1)
-        self.assertEqual(self.does("made['set'] = int(os.environ['OF_A_MODULE'])")["set"], 1)
+        (self.scratch / "plugins" / "sets.py").write_text("import signal\nsignal.signal(10, signal.SIG_IGN)\n")
+        ignored = "made['ignored'] = signal.getsignal(10) == signal.SIG_IGN"
+        self.assertEqual(self.does("import sets\n" + ignored)["ignored"], 1)
+        self.assertEqual(self.does(ignored)["ignored"], 1)
 
-    def test_an_exception_whose_text_fails(self):
-        said = self.failure(
-            "class Odd(Exception):\n    def __str__(self):\n        raise ZeroDivisionError\nraise Odd()"
-        )
-        self.assertIn("Odd: no message", said)
+    def test_a_call_may_raise_anything_and_not_end_its_process(self):
+        for code, said in {
+            "raise SystemExit(0)": "SystemExit: 0",
+            "class Odd(BaseException): pass\nraise Odd('text')": "Odd: text",
+            "class Odd(Exception):\n    def __str__(self):\n        raise ZeroDivisionError\nraise Odd()": "Odd: no message",
+            "os._exit(0)": "mine.py ended its process; a node must return or raise an exception",
+        }.items():
+            self.assertIn(said, self.failure(code))
 
     def test_no_descriptor_of_marrow_is_left_to_what_a_node_starts(self):
         here, there = self.scratch / "here", self.scratch / "there"

@@ -13,8 +13,6 @@
 #include <exception>
 #include <new>
 
-#include "marrow/runtime/process/plugin_code.hpp"
-
 namespace marrow::cli {
 namespace {
 
@@ -42,13 +40,13 @@ void say(const char* text) {
     say("an exception of an unknown type");
   }
   say("\n");
-  end_process(1);
+  _exit(1);
 }
 
 extern "C" void on_stop(int signal) {
   if (is_stopped.exchange(true)) {  // the second signal: do not wait for the nodes
     say("\nmarrow: stopped at once; what was being done is lost\n");
-    end_process(130);
+    _exit(130);
   }
   stopped_by = signal;
   const char* text = stop_text.load();
@@ -108,12 +106,3 @@ std::string stopped_text() {
 }
 
 }  // namespace marrow::cli
-
-// Functions of the C library that end the process without another word. Those of the program are found before those of
-// the library, also by plugins. exit() and quick_exit() call what they were told to (runtime/process/plugin_code.cpp).
-extern "C" {
-
-void _exit(int code) { marrow::end_process(marrow::code_of_end(code)); }
-
-void _Exit(int code) noexcept { marrow::end_process(marrow::code_of_end(code)); }
-}

@@ -2,42 +2,31 @@
 #include "marrow/base/process_state.hpp"
 
 #include <fcntl.h>
-#include <locale.h>
-#include <signal.h>
-#include <sys/resource.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
 #include <array>
-#include <cstdlib>
 #include <cstring>
 #include <exception>
 #include <filesystem>
-#include <fstream>
+#include <limits>
 #include <locale>
-#include <map>
 #include <opencv2/core.hpp>
-#include <optional>
-#include <vector>
 
 #include "marrow/base/descriptor.hpp"
 #include "marrow/base/error.hpp"
-#include "marrow/base/thread_state.hpp"
 
 namespace marrow {
 
-/// This namespace has a name because ProcessState::Parts, which the header declares, has members of these types.
+/// Named, because ProcessState::Parts, which the header declares, has members of these types.
 namespace process_parts {
 
 /// The folder at which all relative paths start. If a plugin's library changed it, inputs would be read and results
 /// written in the wrong place.
 class WorkingFolder {
  public:
-  WorkingFolder() {
-    if (descriptor_.is_open() && fstat(descriptor_, &status_) != 0) descriptor_.close();
-  }
-  /// Returns the folder in which the process was; empty if it had not changed.
-  std::string go_back() const {
+  WorkingFolder() { fstat(descriptor_, &status_); }
+  std::string put_back() const {
     struct stat now {};
     if (!descriptor_.is_open() ||
         (stat(".", &now) == 0 && now.st_dev == status_.st_dev && now.st_ino == status_.st_ino))
@@ -45,7 +34,7 @@ class WorkingFolder {
     std::error_code error;
     const std::filesystem::path elsewhere = std::filesystem::current_path(error);
     if (fchdir(descriptor_) != 0) return "";
-    return error ? "a folder that is gone" : elsewhere.string();
+    return "the working folder was changed to " + (error ? "a folder that is gone" : elsewhere.string());
   }
 
  private:
@@ -61,7 +50,7 @@ class Locale {
     if (!is_other && !is_other_in_c) return "";
     std::locale::global(of_streams_);
     setlocale(LC_ALL, of_c_.c_str());
-    return "the locale";
+    return "the locale was changed";
   }
 
  private:
@@ -69,183 +58,82 @@ class Locale {
   const std::string of_c_ = setlocale(LC_ALL, nullptr);
 };
 
-class Environment {
- public:
-  std::string put_back() const {
-    if (is_same()) return "";
-    std::map<std::string, std::string> before, now = variables(texts_of_process());
-    for (const auto& [name, value] : variables(texts_)) {
-      if (const auto found = now.find(name); found == now.end() || found->second != value)
-        setenv(name.c_str(), value.c_str(), 1);
-      now.erase(name);
-    }
-    for (const auto& [name, value] : now) unsetenv(name.c_str());
-    return "the environment";
-  }
-
- private:
-  static std::vector<std::string> texts_of_process() {
-    std::vector<std::string> texts;
-    for (char** one = environ; one && *one; ++one) texts.emplace_back(*one);
-    return texts;
-  }
-  static std::map<std::string, std::string> variables(const std::vector<std::string>& texts) {
-    std::map<std::string, std::string> found;
-    for (const std::string& text : texts)
-      if (const std::size_t end = text.find('='); end != std::string::npos)
-        found.try_emplace(text.substr(0, end), text.substr(end + 1));
-    return found;
-  }
-  bool is_same() const {
-    std::size_t i = 0;
-    for (char** one = environ; one && *one; ++one, ++i)
-      if (i >= texts_.size() || texts_[i] != *one) return false;
-    return i == texts_.size();
-  }
-
-  const std::vector<std::string> texts_ = texts_of_process();
-};
-
 class SignalHandlers {
  public:
   SignalHandlers() {
-    for (int signal = 1; signal < kEnd; ++signal) sigaction(signal, nullptr, &actions_[std::size_t(signal)]);
+    for (std::size_t i = 0; i < kUsual.size(); ++i) sigaction(kUsual[i], nullptr, &actions_[i]);
   }
   std::string put_back() const {
     std::string changed;
-    for (int signal = 1; signal < kEnd; ++signal) {
-      const struct sigaction& before = actions_[std::size_t(signal)];
+    for (std::size_t i = 0; i < kUsual.size(); ++i) {
       struct sigaction now {};
-      if (sigaction(signal, nullptr, &now) != 0 || now.sa_sigaction == before.sa_sigaction) continue;
-      sigaction(signal, &before, nullptr);
-      changed = "the handling of a signal";
+      if (sigaction(kUsual[i], nullptr, &now) != 0 || now.sa_sigaction == actions_[i].sa_sigaction) continue;
+      sigaction(kUsual[i], &actions_[i], nullptr);
+      changed = "the handling of a signal was changed";
     }
     return changed;
   }
 
  private:
-  static constexpr int kEnd = 32;  // the signals from here on belong to libraries
-  std::array<struct sigaction, kEnd> actions_{};
-};
-
-/// Which files the three standard streams are.
-class StandardStreams {
- public:
-  StandardStreams() {
-    for (int i = 0; i < 3; ++i) {
-      if (fstat(i, &files_[std::size_t(i)]) != 0) continue;
-      copies_[std::size_t(i)] = Descriptor(fcntl(i, F_DUPFD_CLOEXEC, 3));
-    }
-  }
-  std::string put_back() const {
-    std::string changed;
-    for (int i = 0; i < 3; ++i) {
-      const struct stat& before = files_[std::size_t(i)];
-      struct stat now {};
-      const int copy = copies_[std::size_t(i)];
-      if (copy < 0 || (fstat(i, &now) == 0 && now.st_dev == before.st_dev && now.st_ino == before.st_ino)) continue;
-      dup2(copy, i);
-      changed = "a standard stream";
-    }
-    return changed;
-  }
-
- private:
-  std::array<struct stat, 3> files_{};
-  std::array<Descriptor, 3> copies_;
-};
-
-class Limits {
- public:
-  Limits() {
-    for (std::size_t i = 0; i < kWhich.size(); ++i) getrlimit(kWhich[i], &before_[i]);
-  }
-  std::string put_back() const {
-    std::string changed;
-    for (std::size_t i = 0; i < kWhich.size(); ++i) {
-      rlimit now{};
-      if (getrlimit(kWhich[i], &now) != 0 ||
-          (now.rlim_cur == before_[i].rlim_cur && now.rlim_max == before_[i].rlim_max))
-        continue;
-      if (setrlimit(kWhich[i], &before_[i]) != 0) {  // only root can raise the upper limit again
-        now.rlim_cur = std::min(before_[i].rlim_cur, now.rlim_max);
-        setrlimit(kWhich[i], &now);
-      }
-      changed = "a limit of the process";
-    }
-    return changed;
-  }
-
- private:
-  static constexpr std::array kWhich{RLIMIT_NOFILE, RLIMIT_AS,    RLIMIT_DATA, RLIMIT_FSIZE,
-                                     RLIMIT_CPU,    RLIMIT_STACK, RLIMIT_NPROC};
-  std::array<rlimit, kWhich.size()> before_{};
-};
-
-/// Which permissions new files do not get. Only /proc tells it without changing it.
-class PermissionsMask {
- public:
-  PermissionsMask() {
-    std::ifstream status("/proc/self/status");
-    for (std::string line; std::getline(status, line);)
-      if (line.starts_with("Umask:")) before_ = mode_t(std::strtoul(line.c_str() + 6, nullptr, 8));
-  }
-  std::string put_back() const {
-    return before_ && umask(*before_) != *before_ ? "the mask of new files' permissions (umask)" : "";
-  }
-
- private:
-  std::optional<mode_t> before_;
+  static constexpr std::array kUsual{SIGHUP,  SIGINT,  SIGQUIT, SIGILL,  SIGABRT, SIGBUS,  SIGFPE, SIGUSR1,
+                                     SIGSEGV, SIGUSR2, SIGPIPE, SIGALRM, SIGTERM, SIGCHLD, SIGXFSZ};
+  std::array<struct sigaction, kUsual.size()> actions_{};
 };
 
 }  // namespace process_parts
 
-using namespace process_parts;
-
 namespace {
 
-/// How plugin code ended.
-struct Ended {
-  std::exception_ptr fault;
-  std::string changed;
+/// Whether results or operands that are too small for full precision become 0. The library of compilers sets this when
+/// a program or a library that was linked with -ffast-math starts.
+bool flushes_tiny_numbers() {
+  volatile double smallest = std::numeric_limits<double>::min(), tiny = std::numeric_limits<double>::denorm_min();
+  const volatile double half = smallest / 2, product = tiny * 4503599627370496.0;  // 2^52: the smallest normal number
+  return half == 0 || product == 0;
+}
 
-  void expect_sound() const {
-    if (fault) std::rethrow_exception(fault);
-    if (!changed.empty()) throw Error(changed + " while it ran; a plugin must leave it as it is");
-  }
-};
-
-Ended call(const std::function<void()>& code, ProcessState& state) {
-  Ended ended;
-  const ThreadState thread;
-  try {
-    code();
-  } catch (...) {
-    ended.fault = std::current_exception();
-  }
-  const std::string of_thread = thread.put_back(), of_process = state.put_back();
-  ended.changed = of_thread.empty() ? of_process : of_thread + " was changed";
-  return ended;
+std::string unusual_arithmetic() {
+  if (fegetround() != FE_TONEAREST) return "the rounding of numbers was changed";
+  if (flushes_tiny_numbers()) return "the treatment of tiny numbers (-ffast-math makes them 0) was changed";
+  if (fegetexcept() != 0) return "the trapping of faults in calculations was changed";
+  return "";
 }
 
 }  // namespace
 
-struct ProcessState::Parts {
-  WorkingFolder folder;
-  Locale locale;
-  Environment environment;
-  SignalHandlers signals;
-  StandardStreams streams;
-  Limits limits;
-  PermissionsMask mask;
-  std::atomic<bool> has_opencv{false};
+UsualArithmetic::UsualArithmetic() {
+  fegetenv(&before_);
+  fesetenv(FE_DFL_ENV);
+}
 
-  std::string put_back_opencv() const {
-    if (!has_opencv || (cv::useOptimized() && cv::getNumThreads() == 1)) return "";
-    cv::setUseOptimized(true);
-    cv::setNumThreads(1);
-    return "a setting of OpenCV";
+UsualArithmetic::~UsualArithmetic() { fesetenv(&before_); }
+
+ThreadState::ThreadState() : locale_(uselocale(nullptr)) {
+  fesetenv(FE_DFL_ENV);
+  pthread_sigmask(SIG_SETMASK, nullptr, &blocked_);
+  cv::theRNG() = cv::RNG();
+}
+
+std::string ThreadState::put_back() const {
+  std::string changed = unusual_arithmetic();
+  fesetenv(FE_DFL_ENV);
+  if (uselocale(nullptr) != locale_) {
+    if (changed.empty()) changed = "the locale of its thread was changed";
+    uselocale(locale_);
   }
+  sigset_t blocked{};
+  pthread_sigmask(SIG_SETMASK, nullptr, &blocked);
+  if (std::memcmp(&blocked, &blocked_, sizeof blocked) != 0) {
+    if (changed.empty()) changed = "the set of signals that its thread blocks was changed";
+    pthread_sigmask(SIG_SETMASK, &blocked_, nullptr);
+  }
+  return changed;
+}
+
+struct ProcessState::Parts {
+  process_parts::WorkingFolder folder;
+  process_parts::Locale locale;
+  process_parts::SignalHandlers signals;
 };
 
 std::shared_ptr<ProcessState> ProcessState::of_runs() {
@@ -260,43 +148,29 @@ std::shared_ptr<ProcessState> ProcessState::of_runs() {
 ProcessState::ProcessState() : parts_(std::make_unique<Parts>()) {}
 ProcessState::~ProcessState() = default;
 
-void ProcessState::set_up_opencv() {
-  const std::scoped_lock lock(mutex_);
-  cv::setNumThreads(1);
-  cv::setUseOptimized(true);
-  parts_->has_opencv = true;
-}
-
 std::string ProcessState::put_back() {
   const std::scoped_lock lock(mutex_);
-  const std::string elsewhere = parts_->folder.go_back();
-  std::string changed = elsewhere.empty() ? "" : "the working folder was changed to " + elsewhere;
-  for (const std::string& what :
-       {parts_->locale.put_back(), parts_->environment.put_back(), parts_->signals.put_back(),
-        parts_->streams.put_back(), parts_->limits.put_back(), parts_->mask.put_back(), parts_->put_back_opencv()})
-    if (changed.empty() && !what.empty()) changed = what + " was changed";
-  if (!changed.empty()) ++changes_;
+  std::string changed;
+  for (const std::string& what : {parts_->folder.put_back(), parts_->locale.put_back(), parts_->signals.put_back()})
+    if (changed.empty()) changed = what;
+  if (!changed.empty()) ++changes_, last_change_ = changed;
   return changed;
 }
 
 void ProcessState::keep_during(const std::function<void()>& code) {
-  {
-    const std::shared_lock beside_others(calls_);
-    const long before = changes_;
-    const Ended ended = call(code, *this);
-    if (ended.changed.empty() && changes_ == before) return ended.expect_sound();
+  const long before = changes_;
+  const ThreadState thread;
+  std::exception_ptr fault;
+  try {
+    code();
+  } catch (...) {
+    fault = std::current_exception();
   }
-  const std::unique_lock alone(calls_);
-  call(code, *this).expect_sound();
-}
-
-void ProcessState::keep_for_process(const std::function<void()>& start) {
-  constexpr int kMostTimes = 10;  // code that keeps changing the state fails in keep_during()
-  for (int time = 0; time < kMostTimes; ++time) {
-    const long before = changes_;
-    start();
-    if (put_back().empty() && changes_ == before) return;
-  }
+  std::string changed = thread.put_back();
+  put_back();
+  if (fault) std::rethrow_exception(fault);
+  if (const std::scoped_lock lock(mutex_); changed.empty() && changes_ != before) changed = last_change_;
+  if (!changed.empty()) throw Error(changed + " while it ran; a plugin must leave it as it is");
 }
 
 }  // namespace marrow

@@ -1,18 +1,47 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// What all nodes of a process share besides their inputs: the working folder, the locale, the environment, the handlers
-// of signals, the standard streams, limits, the mask of new files' permissions, and OpenCV's settings. A node that
-// changed it would change the results of other nodes, and their keys would not show it.
+// What all nodes of a process share besides their inputs, and could change for the others without a trace in any key:
+// the working folder, the locale, the handlers of signals, and on each thread the arithmetic and the blocked signals.
+// After each call they are compared with what they were. The rest is the plugin's duty (docs/plugins.md).
+#include <fenv.h>
+#include <locale.h>
+#include <signal.h>
+
 #include <atomic>
 #include <functional>
 #include <memory>
 #include <mutex>
-#include <shared_mutex>
 #include <string>
 
 #include "marrow/base/export.hpp"
 
 namespace MARROW_EXPORT marrow {
+
+/// While it lives, this thread calculates with the default settings: it rounds to nearest, keeps tiny numbers and traps
+/// nothing. Afterwards its earlier settings hold again.
+class UsualArithmetic {
+ public:
+  UsualArithmetic();
+  ~UsualArithmetic();
+  UsualArithmetic(const UsualArithmetic&) = delete;
+  UsualArithmetic& operator=(const UsualArithmetic&) = delete;
+
+ private:
+  fenv_t before_;
+};
+
+/// The state of the thread on which a node is called. A call begins with usual arithmetic and with OpenCV's random
+/// numbers at their start, whatever ran there before.
+class ThreadState {
+ public:
+  ThreadState();
+  /// Puts back what has changed. Returns what that was, or an empty text.
+  std::string put_back() const;
+
+ private:
+  locale_t locale_;
+  sigset_t blocked_{};
+};
 
 /// The state of this process as it must stay while nodes run. Safe to use from several threads.
 class ProcessState {
@@ -22,21 +51,10 @@ class ProcessState {
 
   ProcessState();
   ~ProcessState();
-  ProcessState(const ProcessState&) = delete;
-  ProcessState& operator=(const ProcessState&) = delete;
 
-  /// From now on OpenCV's loops stay on the thread that calls them, and OpenCV uses all instructions of the processor.
-  /// Both are part of the state.
-  void set_up_opencv();
-
-  /// Calls plugin code. If the state changes meanwhile, puts it back and calls the code once more, now alone, because
-  /// other code may have changed the state. Throws Error, with what was changed, if it changes again. Passes on
-  /// exceptions of the code.
+  /// Calls plugin code. If the state changes meanwhile, puts it back and throws Error with what was changed. So do
+  /// calls on other threads that ran at the same time: their results may be wrong. Passes on exceptions of the code.
   void keep_during(const std::function<void()>& code);
-
-  /// Calls code that starts a process, which inherits the state. If the state changes meanwhile, puts it back and calls
-  /// the code again. Calls of plugin code may contain such calls.
-  void keep_for_process(const std::function<void()>& start);
 
   /// Puts back what has changed. Returns what that was, in words; an empty text if nothing has.
   std::string put_back();
@@ -46,8 +64,8 @@ class ProcessState {
 
   const std::unique_ptr<Parts> parts_;
   std::mutex mutex_;
-  std::shared_mutex calls_;       ///< shared by calls that run beside others
   std::atomic<long> changes_{0};  ///< how often something had to be put back
+  std::string last_change_;
 };
 
 }  // namespace marrow

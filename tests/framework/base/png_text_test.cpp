@@ -2,8 +2,9 @@
 // Texts in a PNG file of one pixel. The bytes and check sums are those of Python's zlib.
 #include <gtest/gtest.h>
 
-#include <marrow/base/error.hpp>
 #include <marrow/base/png_text.hpp>
+
+#include "tests/harness/message_of.hpp"
 
 namespace png_text_test {
 
@@ -14,12 +15,7 @@ const std::string kRest = "\0\0\0\x0aIDATx\xda\x63\x60\x07\0\0\x09\0\x08\x8d\xab
 const std::string kText = "\0\0\0\x0ciTXtkey\0\0\0\0\0a\xc3\xa9\n\x9f\x07\x80\x0b"s;  // "aé", and the end of the line
 
 std::string fault_of(const std::string& png, const std::string& keyword = "key") {
-  try {
-    (void)marrow::png_text(png, keyword);
-  } catch (const marrow::Error& error) {
-    return error.what();
-  }
-  return "none";
+  return marrow::test::message_of([&] { (void)marrow::png_text(png, keyword); });
 }
 
 std::string with(std::string png, std::size_t at, char byte) {

@@ -9,8 +9,8 @@
 
 #include <thread>
 
-#include "marrow/base/error.hpp"
 #include "tests/framework/fixture.hpp"
+#include "tests/harness/message_of.hpp"
 #include "tests/plugins/write/full_disk.hpp"
 
 namespace text_file_test {
@@ -18,21 +18,13 @@ namespace text_file_test {
 namespace fs = std::filesystem;
 using marrow::read_text_file;
 using marrow::write_text_file;
+using marrow::test::message_of;
 using runtime_fixture::Scratch;
-
-std::string fault_of(const std::function<void()>& act) {
-  try {
-    act();
-  } catch (const marrow::Error& error) {
-    return error.what();
-  }
-  return "none";
-}
 
 class TextFileTest : public testing::Test {
  protected:
   std::string fault_in_reading(const fs::path& file, std::uintmax_t most = 100) {
-    const std::string fault = fault_of([&] { read_text_file(file, most); });
+    const std::string fault = message_of([&] { read_text_file(file, most); });
     return fault.starts_with(file.string()) ? fault.substr(file.string().size()) : fault;
   }
   std::size_t files() const {
@@ -50,7 +42,7 @@ TEST_F(TextFileTest, ReadsBackWhatItWrote) {
 }
 
 TEST_F(TextFileTest, SaysWhyItDoesNotRead) {
-  EXPECT_EQ(fault_in_reading(scratch.path / "none"), " cannot be read: No such file or directory");
+  EXPECT_EQ(fault_in_reading(scratch.path / ""), " cannot be read: No such file or directory");
   EXPECT_EQ(fault_in_reading(scratch.path), " is a folder, not a regular file");
   scratch.write("long", std::string(3000001, 'x'));
   EXPECT_EQ(fault_in_reading(scratch.path / "long", 3000000), " is longer than 3 MB");
@@ -84,21 +76,21 @@ TEST_F(TextFileTest, FullDiskLeavesTheOldFile) {
   {
     const marrow::test::FullDisk full(1000);
     EXPECT_NE(
-        fault_of([&] { write_text_file(file, std::string(5000, 'x')); }).find("cannot write " + file.string() + ": "),
+        message_of([&] { write_text_file(file, std::string(5000, 'x')); }).find("cannot write " + file.string() + ": "),
         std::string::npos);
-    EXPECT_NE(fault_of([&] { write_text_file(scratch.path / "new", std::string(5000, 'x')); }), "none");
+    EXPECT_NE(message_of([&] { write_text_file(scratch.path / "new", std::string(5000, 'x')); }), "");
   }
   EXPECT_EQ(read_text_file(file, 100), "old");
   EXPECT_EQ(files(), 1u);
 }
 
 TEST_F(TextFileTest, WhereItCannotWrite) {
-  EXPECT_EQ(fault_of([&] { write_text_file(scratch.path / "no" / "file", "x"); }),
+  EXPECT_EQ(message_of([&] { write_text_file(scratch.path / "no" / "file", "x"); }),
             "cannot write " + (scratch.path / "no" / "file").string() + ": No such file or directory");
   fs::create_directory(scratch.path / "folder");
-  EXPECT_NE(fault_of([&] { write_text_file(scratch.path / "folder", "x"); }).find("directory"), std::string::npos);
+  EXPECT_NE(message_of([&] { write_text_file(scratch.path / "folder", "x"); }).find("directory"), std::string::npos);
   const auto kinds = marrow::Kinds::files_and_pipes;
-  EXPECT_EQ(fault_of([&] { write_text_file("/dev/full", "x", kinds); }), "cannot write /dev/full: the disk is full");
+  EXPECT_EQ(message_of([&] { write_text_file("/dev/full", "x", kinds); }), "cannot write /dev/full: the disk is full");
   write_text_file("/dev/null", "x", kinds);
   EXPECT_TRUE(fs::is_character_file("/dev/null"));
   EXPECT_EQ(files(), 1u);
@@ -145,7 +137,7 @@ TEST_F(TextFileTest, WritersOfTheSameNumberInTwoContainersDoNotMeet) {
       writers.push_back(in_container([&] {
         while (!fs::exists(begin)) continue;
         for (int i = 0; i < 50; ++i)
-          if (fault_of([&] { write_text_file(file, "text"); }) != "none") return false;
+          if (message_of([&] { write_text_file(file, "text"); }) != "") return false;
         return true;
       }));
     scratch.write("begin", "");
@@ -163,10 +155,10 @@ TEST_F(TextFileTest, ReadsWhereStandardInputIsClosed) {
   const fs::path file = scratch.write("file", "text");
   const int kept = dup(STDIN_FILENO);
   close(STDIN_FILENO);
-  const std::string fault = fault_of([&] { EXPECT_EQ(read_text_file(file, 100), "text"); });
+  const std::string fault = message_of([&] { EXPECT_EQ(read_text_file(file, 100), "text"); });
   dup2(kept, STDIN_FILENO);
   close(kept);
-  EXPECT_EQ(fault, "none");
+  EXPECT_EQ(fault, "");
 }
 
 }  // namespace text_file_test

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <gtest/gtest.h>
 
+#include <Eigen/Geometry>
 #include <cmath>
 #include <marrow/domain/camera.hpp>
 
@@ -90,47 +91,28 @@ TEST(Camera, AnOffsetInTheImageInMillimetres) {
 }
 
 TEST(Camera, CheckNamesTheFault) {
-  EXPECT_EQ(message_of([] { check_camera(frontal(), "view 'a'"); }), "");
-  marrow::Camera camera = frontal();
-  camera.height_px = 0;
-  EXPECT_EQ(message_of([&] { check_camera(camera, "view 'a'"); }),
-            "view 'a': image size 400 x 0 pixels is not positive");
-  camera = frontal();
-  camera.width_px = -1;
-  EXPECT_NE(message_of([&] { check_camera(camera, "view 'a'"); }).find("image size -1 x 800"), std::string::npos);
-  camera = frontal();
-  camera.width_px = camera.height_px = 1;
-  EXPECT_EQ(message_of([&] { check_camera(camera, "view 'a'"); }), "");
-  camera = frontal();
-  camera.intrinsics(0, 0) = 0;
-  EXPECT_NE(message_of([&] { check_camera(camera, "view 'a'"); }).find("needs positive focal lengths"),
-            std::string::npos);
-  camera = frontal();
-  camera.intrinsics(1, 1) = -1;
-  EXPECT_EQ(message_of([&] { check_camera(camera, "view 'a'"); }),
+  const auto message = [](auto change) {
+    marrow::Camera camera = frontal();
+    change(camera);
+    return message_of([&] { check_camera(camera, "view 'a'"); });
+  };
+  const auto expect_part = [&](auto change, const std::string& part) {
+    EXPECT_NE(message(change).find(part), std::string::npos) << message(change);
+  };
+  EXPECT_EQ(message([](auto&) {}), "");
+  EXPECT_EQ(message([](auto& c) { c.width_px = c.height_px = 1; }), "");
+  EXPECT_EQ(message([](auto& c) { c.height_px = 0; }), "view 'a': image size 400 x 0 pixels is not positive");
+  expect_part([](auto& c) { c.width_px = -1; }, "image size -1 x 800");
+  expect_part([](auto& c) { c.width_px = 65537; }, "expected at most 65536 each way");
+  expect_part([](auto& c) { c.intrinsics(0, 0) = 0; }, "needs positive focal lengths");
+  EXPECT_EQ(message([](auto& c) { c.intrinsics(1, 1) = -1; }),
             "view 'a': the camera matrix needs positive focal lengths in its first two diagonal places");
-  camera = frontal();
-  camera.intrinsics(2, 2) = 2;
-  EXPECT_EQ(message_of([&] {
-              check_camera(camera, "view 'a'");
-            }).find("view 'a': the camera matrix is not [f_u s u_0; 0 f_v v_0; 0 0 1]"),
-            0u);
-  camera = frontal();
-  camera.intrinsics(1, 0) = 5;
-  EXPECT_NE(message_of([&] { check_camera(camera, "view 'a'"); }), "");
-  camera = frontal();
-  camera.intrinsics.transposeInPlace();
-  EXPECT_NE(message_of([&] { check_camera(camera, "view 'a'"); }).find("it looks transposed"), std::string::npos);
-  camera = frontal();
-  camera.width_px = 65537;
-  EXPECT_NE(message_of([&] { check_camera(camera, "view 'a'"); }).find("expected at most 65536 each way"),
-            std::string::npos);
-  camera = frontal();
-  camera.intrinsics(0, 2) = std::nan("");
-  EXPECT_NE(message_of([&] { check_camera(camera, "view 'a'"); }), "");
-  camera = frontal();
-  camera.camera_from_world.rotation *= 2;
-  EXPECT_NE(message_of([&] { check_camera(camera, "view 'a'"); }).find("not a rotation"), std::string::npos);
+  expect_part([](auto& c) { c.intrinsics(2, 2) = 2; },
+              "view 'a': the camera matrix is not [f_u s u_0; 0 f_v v_0; 0 0 1]");
+  EXPECT_NE(message([](auto& c) { c.intrinsics(1, 0) = 5; }), "");
+  expect_part([](auto& c) { c.intrinsics.transposeInPlace(); }, "it looks transposed");
+  EXPECT_NE(message([](auto& c) { c.intrinsics(0, 2) = std::nan(""); }), "");
+  expect_part([](auto& c) { c.camera_from_world.rotation *= 2; }, "not a rotation");
 }
 
 TEST(Camera, DistortionThatMoreThanDoublesTheImageIsRefused) {
@@ -148,25 +130,65 @@ TEST(Camera, DistortionThatMoreThanDoublesTheImageIsRefused) {
 }
 
 TEST(View, CheckNamesTheFault) {
-  marrow::View view{"lateral", {cv::Mat(800, 400, CV_8U, cv::Scalar(0))}, frontal(), {}};
-  EXPECT_EQ(message_of([&] { check_view(view); }), "");
-  view.mask = cv::Mat(800, 401, CV_8U, cv::Scalar(0));
-  EXPECT_EQ(message_of([&] { check_view(view); }),
-            "view 'lateral': the mask has 401 x 800 pixels, the image 400 x 800");
-  view.mask = cv::Mat(799, 400, CV_8U, cv::Scalar(0));
-  EXPECT_EQ(message_of([&] { check_view(view); }),
-            "view 'lateral': the mask has 400 x 799 pixels, the image 400 x 800");
-  for (const auto& [width, height] : {std::pair(400, 801), {399, 800}}) {
-    view.image.pixels = cv::Mat(height, width, CV_8U, cv::Scalar(0));
-    EXPECT_NE(message_of([&] { check_view(view); }).find("but its camera is for 400 x 800"), std::string::npos);
-  }
-  view.image.pixels = cv::Mat(512, 512, CV_8U, cv::Scalar(0));
-  EXPECT_EQ(message_of([&] { check_view(view); }),
-            "view 'lateral': the image has 512 x 512 pixels, but its camera is for 400 x 800; give the camera that "
-            "belongs to "
-            "this image");
-  view.image.pixels = cv::Mat();
-  EXPECT_EQ(message_of([&] { check_view(view); }), "view 'lateral': the image is empty");
+  const auto message = [](int width, int height, const cv::Mat& mask = {}) {
+    return message_of([&] {
+      check_view(marrow::View{"lateral", {cv::Mat(height, width, CV_8U, cv::Scalar(0))}, frontal(), mask});
+    });
+  };
+  const auto mask = [](int width, int height) { return cv::Mat(height, width, CV_8U, cv::Scalar(0)); };
+  EXPECT_EQ(message(400, 800), "");
+  EXPECT_EQ(message(400, 800, mask(401, 800)), "view 'lateral': the mask has 401 x 800 pixels, the image 400 x 800");
+  EXPECT_EQ(message(400, 800, mask(400, 799)), "view 'lateral': the mask has 400 x 799 pixels, the image 400 x 800");
+  for (const auto& [width, height] : {std::pair(400, 801), {399, 800}, {512, 512}})
+    EXPECT_EQ(message(width, height), "view 'lateral': the image has " + std::to_string(width) + " x " +
+                                          std::to_string(height) +
+                                          " pixels, but its camera is for 400 x 800; give the camera that belongs to "
+                                          "this image");
+  EXPECT_EQ(message(0, 0), "view 'lateral': the image is empty");
+}
+
+/// A view from `source`, whose central ray goes through `aim`.
+marrow::View aimed(const Vector3d& source, const Vector3d& aim) {
+  marrow::View view;
+  view.camera.width_px = view.camera.height_px = 100;
+  view.camera.intrinsics << 1000, 0, 20, 0, 1000, 70, 0, 0, 1;
+  const Vector3d z = (aim - source).normalized(), x = z.unitOrthogonal();
+  view.camera.camera_from_world.rotation << x.transpose(), z.cross(x).transpose(), z.transpose();
+  view.camera.camera_from_world.translation_mm = -(view.camera.camera_from_world.rotation * source);
+  return view;
+}
+marrow::List<marrow::View> both(const marrow::View& one, const marrow::View& other) {
+  marrow::List<marrow::View> views;
+  views.add("one", one);
+  views.add("other", other);
+  return views;
+}
+
+TEST(CentralRays, MeetWhereTheyAreAimed) {
+  const Vector3d aim(120, -340, 55);
+  const auto met = marrow::meeting_point_mm(both(aimed({700, 0, 0}, aim), aimed({0, 300, 200}, aim)));
+  ASSERT_TRUE(met);
+  EXPECT_LT((*met - aim).norm(), 1e-9);
+}
+
+TEST(CentralRays, ThatMissEachOtherMeetHalfWay) {
+  // One runs along x at z = 0, the other along y at z = 10.
+  const auto met = marrow::meeting_point_mm(both(aimed({-600, 0, 0}, {0, 0, 0}), aimed({7, -600, 10}, {7, 0, 10})));
+  ASSERT_TRUE(met);
+  EXPECT_LT((*met - Vector3d(7, 0, 5)).norm(), 1e-9);
+}
+
+TEST(CentralRays, DoNotAlwaysTellWhereTheBoneIs) {
+  marrow::List<marrow::View> single;
+  single.add("one", aimed({0, -600, 0}, {0, 0, 0}));
+  EXPECT_FALSE(marrow::meeting_point_mm(single));
+  EXPECT_FALSE(marrow::meeting_point_mm({}));
+  EXPECT_FALSE(marrow::meeting_point_mm(both(aimed({0, -600, 0}, {0, 0, 0}), aimed({20, -600, 0}, {0, 0, 0}))))
+      << "1.9 degrees apart";
+  EXPECT_TRUE(marrow::meeting_point_mm(both(aimed({0, -600, 0}, {0, 0, 0}), aimed({40, -600, 0}, {0, 0, 0}))))
+      << "3.8 degrees apart";
+  EXPECT_FALSE(marrow::meeting_point_mm(both(aimed({0, -600, 0}, {0, -900, 0}), aimed({600, 0, 0}, {900, 0, 0}))))
+      << "they meet behind the sources";
 }
 
 }  // namespace camera_test

@@ -49,26 +49,22 @@ TEST(RigidTransform, InverseSwapsFramesAndUndoes) {
 }
 
 TEST(RigidTransform, CheckNamesTheFault) {
-  RigidTransform transform;
-  EXPECT_EQ(message_of([&] { check_rigid(transform, "start"); }), "");
-  transform.rotation(0, 0) = -1;  // a mirror is orthonormal, but no rotation
-  EXPECT_EQ(message_of([&] { check_rigid(transform, "start"); }),
+  const auto message = [](const Matrix3d& rotation, const Vector3d& translation_mm = Vector3d::Zero()) {
+    return message_of([&] { check_rigid(RigidTransform{"", "", rotation, translation_mm}, "start"); });
+  };
+  const Matrix3d identity = Matrix3d::Identity();
+  EXPECT_EQ(message(identity), "");
+  // A mirror is orthonormal, but no rotation.
+  EXPECT_EQ(message(Vector3d(-1, 1, 1).asDiagonal()),
             "start: not a rotation (off orthonormal by 0.000000, determinant -1.000000); a rotation is orthonormal "
             "with determinant +1");
-  transform.rotation = 1.1 * Matrix3d::Identity();
-  EXPECT_NE(message_of([&] { check_rigid(transform, "start"); }).find("off orthonormal by 0.21"), std::string::npos);
-  transform.rotation = (1 + 0.4e-6) * Matrix3d::Identity();  // off by 0.8e-6
-  EXPECT_EQ(message_of([&] { check_rigid(transform, "start"); }), "");
-  transform.rotation = (1 + 0.6e-6) * Matrix3d::Identity();
-  EXPECT_NE(message_of([&] { check_rigid(transform, "start"); }).find("not a rotation"), std::string::npos);
-  transform.rotation.setIdentity();
-  transform.rotation(1, 2) = std::nan("");
-  EXPECT_EQ(message_of([&] { check_rigid(transform, "start"); }),
-            "start: the transform has a number that is not finite");
-  transform.rotation.setIdentity();
-  transform.translation_mm.x() = std::numeric_limits<double>::infinity();
-  EXPECT_EQ(message_of([&] { check_rigid(transform, "start"); }),
-            "start: the transform has a number that is not finite");
+  EXPECT_NE(message(1.1 * identity).find("off orthonormal by 0.21"), std::string::npos);
+  EXPECT_EQ(message((1 + 0.4e-6) * identity), "") << "off by 0.8e-6";
+  EXPECT_NE(message((1 + 0.6e-6) * identity).find("not a rotation"), std::string::npos);
+  Matrix3d holed = identity;
+  holed(1, 2) = std::nan("");
+  for (const std::string& said : {message(holed), message(identity, {std::numeric_limits<double>::infinity(), 0, 0})})
+    EXPECT_EQ(said, "start: the transform has a number that is not finite");
 }
 
 TEST(Rotation, VectorAndMatrixAgree) {

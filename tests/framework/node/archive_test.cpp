@@ -7,6 +7,7 @@
 #include <random>
 
 #include "marrow/runtime/node/types.hpp"
+#include "tests/harness/message_of.hpp"
 
 namespace archive_test {
 
@@ -33,12 +34,7 @@ std::string packed(const T& value) {
 
 template <class T>
 std::string fault_of(const std::string& bytes) {
-  try {
-    Unpacker(bytes).get<T>();
-  } catch (const marrow::Error& error) {
-    return error.what();
-  }
-  return "";
+  return marrow::test::message_of([&] { Unpacker(bytes).get<T>(); });
 }
 
 TEST(Archive, ReadsBackWhatItTook) {

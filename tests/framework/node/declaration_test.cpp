@@ -20,14 +20,26 @@ struct Options {
 Metrics plain(const Metrics&, const Options&) { return {}; }
 List<Metrics> listed(const List<Metrics>&) { return {}; }
 std::tuple<Metrics, marrow::Pose> two() { return {}; }
-Metrics sees(const marrow::Truth&) { return {}; }
-marrow::EdgeMap edges(const marrow::View&) { return {}; }
 int nothing_registered() { return 1; }
 
-std::string faults(const Plugin& plugin) {
+/// Declares a node in a plugin of its own. Gives what is wrong with it, a fault a line.
+template <class Declare>
+std::string faults(const Declare& declare) {
+  Plugin plugin;
+  declare(plugin);
   std::string text;
   for (const std::string& fault : plugin.nodes.back().faults) text += fault + "\n";
   return text;
+}
+/// The same of the option of a node on which nothing else is wrong.
+template <class Member, class... Attributes>
+std::string option_faults(const char* name, Member member, Attributes... attributes) {
+  return faults([&](Plugin& plugin) {
+    plugin.node("test.plain", plain).summary("s").in("a", "h").out("b", "h").option(name, member, "h", attributes...);
+  });
+}
+void expect_faults(const std::string& found, const std::vector<std::string>& expected) {
+  for (const std::string& fault : expected) EXPECT_NE(found.find(fault), std::string::npos) << fault << "\n" << found;
 }
 
 TEST(Declaration, GoodOneHasNoFaults) {
@@ -37,72 +49,54 @@ TEST(Declaration, GoodOneHasNoFaults) {
       .in("a", "h")
       .out("b", "h")
       .option("size_mm", &Options::size_mm, "h", marrow::at_least(0));
-  EXPECT_EQ(faults(plugin), "");
   const marrow::NodeInfo& info = plugin.nodes.back().info;
+  EXPECT_TRUE(plugin.nodes.back().faults.empty());
   EXPECT_EQ(info.options[0].unit, "mm") << "read off the name";
   EXPECT_EQ(info.inputs[0].type.id, "metrics");
   EXPECT_EQ(info.kind(), "test");
 }
-TEST(Declaration, TooFewInputs) {
-  Plugin plugin;
-  plugin.node("test.plain", plain).summary("s").out("b", "h");
-  EXPECT_NE(faults(plugin).find("the function takes 1 inputs, but .in() names 0"), std::string::npos);
+TEST(Declaration, FaultsOfNamesAndPorts) {
+  using Declare = void (*)(Plugin&);
+  const std::vector<std::pair<Declare, std::vector<std::string>>> rows{
+      {[](Plugin& p) { p.node("test.plain", plain).summary("s").out("b", "h"); },
+       {"the function takes 1 inputs, but .in() names 0"}},
+      {[](Plugin& p) { p.node("test.listed", listed).summary("s").in("a", "h").out("b", "h"); },
+       {"input 'a': a List needs over(\"axis\")", "output 'b': a List needs over(\"axis\")"}},
+      {[](Plugin& p) { p.node("Plain", plain).in("a", "h"); },
+       {"has no summary", "has no output", "a node's name is kind.name in lower_case"}},
+      {[](Plugin& p) { p.node("test.two", two).summary("s").out("a", "h").out("a", "h"); },
+       {"output 'a' is named twice"}},
+      {[](Plugin& p) { p.node("test.two", two).summary("s").out("a", "h").out("b", "h").out("c", "h"); },
+       {"output 'c': the returned tuple has fewer items"}},
+      {[](Plugin& p) { p.node("test.nothing", nothing_registered).summary("s").out("a", "h"); },
+       {"the returned type is not registered with MARROW_VALUE_TYPE"}},
+      {[](Plugin& p) {
+         p.node("test.plain", plain).summary("s").in("a", "h").out("b", "h").trait("Fast").trait("good").trait("good");
+       },
+       {"trait 'Fast': names are lower_case", "trait 'good' is named twice"}},
+      {[](Plugin& p) {
+         p.node("test.plain", plain)
+             .summary("s")
+             .in("a", "h")
+             .out("b", "h")
+             .option("word", &Options::word, "h")
+             .option("word", &Options::word, "h");
+       },
+       {"option 'word' is named twice"}}};
+  for (const auto& [declare, expected] : rows) expect_faults(faults(declare), expected);
 }
-TEST(Declaration, ListWithoutAxis) {
-  Plugin plugin;
-  plugin.node("test.listed", listed).summary("s").in("a", "h").out("b", "h");
-  EXPECT_NE(faults(plugin).find("input 'a': a List needs over(\"axis\")"), std::string::npos);
-  EXPECT_NE(faults(plugin).find("output 'b': a List needs over(\"axis\")"), std::string::npos);
-}
-TEST(Declaration, NoSummaryNoOutputBadName) {
-  Plugin plugin;
-  plugin.node("Plain", plain).in("a", "h");
-  EXPECT_NE(faults(plugin).find("has no summary"), std::string::npos);
-  EXPECT_NE(faults(plugin).find("has no output"), std::string::npos);
-  EXPECT_NE(faults(plugin).find("a node's name is kind.name in lower_case"), std::string::npos);
-}
-TEST(Declaration, DefaultNotAmongChoices) {
-  Plugin plugin;
-  plugin.node("test.plain", plain)
-      .summary("s")
-      .in("a", "h")
-      .out("b", "h")
-      .option("word", &Options::word, "h", marrow::one_of({"x", "y"}));
-  EXPECT_NE(faults(plugin).find("option 'word': its default 'a' is not one of its choices"), std::string::npos);
-}
-TEST(Declaration, ReplacesWhatNoFunctionBrings) {
-  Plugin plugin;
-  plugin.node("test.plain", plain)
-      .summary("s")
-      .in("a", "h")
-      .out("b", "h")
-      .option("size_mm", &Options::size_mm, "h", marrow::replaces({"size_mm", "a.size_mm", "Size"}));
-  EXPECT_EQ(faults(plugin).find("replaces 'size_mm'"), std::string::npos);
-  EXPECT_NE(faults(plugin).find("option 'size_mm' replaces 'a.size_mm': there is no input 'a' that takes functions"),
-            std::string::npos);
-  EXPECT_NE(faults(plugin).find("option 'size_mm' replaces 'Size': names are lower_case"), std::string::npos);
-}
-TEST(Declaration, FilesBesideWhatIsNoFile) {
-  Plugin plugin;
-  plugin.node("test.plain", plain)
-      .summary("s")
-      .in("a", "h")
-      .out("b", "h")
-      .option("word", &Options::word, "h", marrow::beside({".onnx", "yaml", "../x"}));
-  EXPECT_NE(faults(plugin).find("option 'word': beside: files can lie beside an option of type path only"),
-            std::string::npos);
-  EXPECT_NE(faults(plugin).find("an ending begins with a dot, as .onnx, but this is 'yaml'"), std::string::npos);
-  EXPECT_NE(faults(plugin).find("an ending begins with a dot, as .onnx, but this is '../x'"), std::string::npos);
-}
-TEST(Declaration, OptionNamedTwice) {
-  Plugin plugin;
-  plugin.node("test.plain", plain)
-      .summary("s")
-      .in("a", "h")
-      .out("b", "h")
-      .option("word", &Options::word, "h")
-      .option("word", &Options::word, "h");
-  EXPECT_NE(faults(plugin).find("option 'word' is named twice"), std::string::npos);
+TEST(Declaration, FaultsOfOptions) {
+  expect_faults(option_faults("word", &Options::word, marrow::one_of({"x", "y"})),
+                {"option 'word': its default 'a' is not one of its choices"});
+  const std::string replaced =
+      option_faults("size_mm", &Options::size_mm, marrow::replaces({"size_mm", "a.size_mm", "Size"}));
+  EXPECT_EQ(replaced.find("replaces 'size_mm'"), std::string::npos);
+  expect_faults(replaced, {"option 'size_mm' replaces 'a.size_mm': there is no input 'a' that takes functions",
+                           "option 'size_mm' replaces 'Size': names are lower_case"});
+  expect_faults(option_faults("word", &Options::word, marrow::beside({".onnx", "yaml", "../x"})),
+                {"option 'word': beside: files can lie beside an option of type path only",
+                 "an ending begins with a dot, as .onnx, but this is 'yaml'",
+                 "an ending begins with a dot, as .onnx, but this is '../x'"});
 }
 TEST(Declaration, NumbersThatCannotBeWrittenDown) {
   struct Odd {
@@ -110,48 +104,30 @@ TEST(Declaration, NumbersThatCannotBeWrittenDown) {
     double y = 1;
   };
   Metrics (*odd)(const Metrics&, const Odd&) = [](const Metrics& metrics, const Odd&) { return metrics; };
-  Plugin plugin;
-  plugin.node("test.odd", odd)
-      .summary("s")
-      .in("a", "h")
-      .out("b", "h")
-      .option("x", &Odd::x, "h")
-      .option("y", &Odd::y, "h", marrow::at_least(2), marrow::at_most(0))
-      .option("z", &Odd::y, "h", marrow::at_most(std::numeric_limits<double>::infinity()));
-  EXPECT_NE(faults(plugin).find("option 'x': its default is not a finite number"), std::string::npos);
-  EXPECT_NE(faults(plugin).find("option 'y': its range is empty or not finite"), std::string::npos);
-  EXPECT_NE(faults(plugin).find("option 'z': its range is empty or not finite"), std::string::npos);
+  const std::string found = faults([&](Plugin& plugin) {
+    plugin.node("test.odd", odd)
+        .summary("s")
+        .in("a", "h")
+        .out("b", "h")
+        .option("x", &Odd::x, "h")
+        .option("y", &Odd::y, "h", marrow::at_least(2), marrow::at_most(0))
+        .option("z", &Odd::y, "h", marrow::at_most(std::numeric_limits<double>::infinity()));
+  });
+  expect_faults(found,
+                {"option 'x': its default is not a finite number", "option 'y': its range is empty or not finite",
+                 "option 'z': its range is empty or not finite"});
 }
 TEST(Declaration, TextsThatCannotBeShown) {
-  for (const char* text : {"\x1b[2J", "two\nlines", "\xff"}) {
-    Plugin plugin;
-    plugin.node("test.plain", plain).summary(text).in("a", text).out("b", "h").option("word", &Options::word, text);
-    EXPECT_NE(faults(plugin).find("summary: its texts must be UTF-8 without control characters"), std::string::npos);
-    EXPECT_NE(faults(plugin).find("input 'a': its texts must be UTF-8 without control characters"), std::string::npos);
-    EXPECT_NE(faults(plugin).find("option 'word': its texts must be UTF-8 without control characters"),
-              std::string::npos);
-  }
-}
-TEST(Declaration, PortNamedTwice) {
-  Plugin plugin;
-  plugin.node("test.two", two).summary("s").out("a", "h").out("a", "h");
-  EXPECT_NE(faults(plugin).find("output 'a' is named twice"), std::string::npos);
-}
-TEST(Declaration, TupleHasFewerItems) {
-  Plugin plugin;
-  plugin.node("test.two", two).summary("s").out("a", "h").out("b", "h").out("c", "h");
-  EXPECT_NE(faults(plugin).find("output 'c': the returned tuple has fewer items"), std::string::npos);
-}
-TEST(Declaration, UnregisteredReturnType) {
-  Plugin plugin;
-  plugin.node("test.nothing", nothing_registered).summary("s").out("a", "h");
-  EXPECT_NE(faults(plugin).find("the returned type is not registered with MARROW_VALUE_TYPE"), std::string::npos);
-}
-TEST(Declaration, Traits) {
-  Plugin plugin;
-  plugin.node("test.plain", plain).summary("s").in("a", "h").out("b", "h").trait("Fast").trait("good").trait("good");
-  EXPECT_NE(faults(plugin).find("trait 'Fast': names are lower_case"), std::string::npos);
-  EXPECT_NE(faults(plugin).find("trait 'good' is named twice"), std::string::npos);
+  const std::string said = ": its texts must be UTF-8 without control characters";
+  for (const char* text : {"\x1b[2J", "two\nlines", "\xff"})
+    expect_faults(faults([&](Plugin& plugin) {
+                    plugin.node("test.plain", plain)
+                        .summary(text)
+                        .in("a", text)
+                        .out("b", "h")
+                        .option("word", &Options::word, text);
+                  }),
+                  {"summary" + said, "input 'a'" + said, "option 'word'" + said});
 }
 TEST(Declaration, Kinds) {
   Plugin plugin;

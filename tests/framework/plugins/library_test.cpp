@@ -7,12 +7,14 @@
 
 #include "marrow/runtime/plugins/manifest.hpp"
 #include "tests/framework/plugins/library_fixture.hpp"
+#include "tests/harness/message_of.hpp"
 
 namespace library_test {
 
 namespace fs = std::filesystem;
 using library_fixture::kBad;
 using library_fixture::kGood;
+using marrow::test::message_of;
 using nlohmann::json;
 
 class LibraryTest : public library_fixture::LibraryTest {
@@ -43,14 +45,9 @@ class LibraryTest : public library_fixture::LibraryTest {
     const fs::path file = copy_with_invented(invent);
     const marrow::Catalogue catalogue({scratch.path / "plugins"});
     ASSERT_EQ(catalogue.libraries().at(0).note, "");
-    try {
-      catalogue.load("test.constant");
-      ADD_FAILURE() << "loaded, not refused: " << reason;
-    } catch (const marrow::Error& error) {
-      EXPECT_EQ(std::string(error.what()), file.string() + " is not what its description says: " + reason +
-                                               "; run 'marrow describe " + file.string() + " --write', or remove " +
-                                               fs::path(file).replace_extension(".json").string());
-    }
+    EXPECT_EQ(message_of([&] { catalogue.load("test.constant"); }),
+              file.string() + " is not what its description says: " + reason + "; run 'marrow describe " +
+                  file.string() + " --write', or remove " + fs::path(file).replace_extension(".json").string());
   }
 };
 
@@ -60,38 +57,27 @@ TEST_F(LibraryTest, GoodLibraryIsDescribed) {
   EXPECT_GT(info.nodes.size(), 5u);
   EXPECT_GT(info.linked.size(), 1u);
 }
-TEST_F(LibraryTest, OtherApi) {
-  expect_refused(kBad / "other_api.so", "was built for plugin interface 7.2, this marrow has 1.0");
-}
-TEST_F(LibraryTest, DebugMode) {
-  expect_refused(kBad / "debug_mode.so", "was built with _GLIBCXX_DEBUG (debug mode) on, this marrow with off");
-}
-TEST_F(LibraryTest, OtherEigenAlignment) {
-  if (!fs::exists(kBad / "other_alignment.so")) GTEST_SKIP() << "only where -mavx changes the alignment";
-  expect_refused(kBad / "other_alignment.so", "was built with EIGEN_MAX_ALIGN_BYTES 32, this marrow with 16");
-}
-TEST_F(LibraryTest, FastMath) {
-  expect_refused(kBad / "fast_math.so",
-                 "was built with -ffast-math on, this marrow with off; leave out -ffast-math and -Ofast: they change "
-                 "the results of other nodes, and NaN is not seen");
-}
-TEST_F(LibraryTest, Crash) { expect_refused(kBad / "crashes.so", "crashed while being loaded (Segmentation fault)"); }
-TEST_F(LibraryTest, Throws) { expect_refused(kBad / "throws.so", "crashed while being loaded (Aborted)"); }
-TEST_F(LibraryTest, NoEntry) {
-  expect_refused(kBad / "no_entry.so", "is not a marrow plugin: it has no function marrow_plugin_entry");
-}
-TEST_F(LibraryTest, WrongDeclaration) {
-  expect_refused(kBad / "wrong_declaration.so",
-                 "declares its nodes wrongly: edges.wrong: option 'low': its default is outside its own range; "
-                 "edges.wrong: trait 'fast' is named twice");
-}
-TEST_F(LibraryTest, TextFile) {
-  expect_refused(scratch.write("text.so", "hello\n"), "is not a shared library (it does not begin with an ELF header)");
-}
-TEST_F(LibraryTest, Truncated) {
-  const fs::path file = copy_good(false);
-  fs::resize_file(file, fs::file_size(file) / 2);
-  expect_refused(file, "is truncated: its ELF header speaks of");
+TEST_F(LibraryTest, BadOnesAreRefused) {
+  fs::path truncated = copy_good(false);
+  fs::resize_file(truncated, fs::file_size(truncated) / 2);
+  const std::vector<std::pair<fs::path, std::string>> rows{
+      {kBad / "other_api.so", "was built for plugin interface 7.2, this marrow has 1.0"},
+      {kBad / "debug_mode.so", "was built with _GLIBCXX_DEBUG (debug mode) on, this marrow with off"},
+      {kBad / "other_alignment.so", "was built with EIGEN_MAX_ALIGN_BYTES 32, this marrow with 16"},
+      {kBad / "fast_math.so",
+       "was built with -ffast-math on, this marrow with off; leave out -ffast-math and -Ofast: they change the results "
+       "of other nodes, and NaN is not seen"},
+      {kBad / "crashes.so", "crashed while being loaded (Segmentation fault)"},
+      {kBad / "throws.so", "crashed while being loaded (Aborted)"},
+      {kBad / "no_entry.so", "is not a marrow plugin: it has no function marrow_plugin_entry"},
+      {kBad / "wrong_declaration.so",
+       "declares its nodes wrongly: edges.wrong: option 'low': its default is outside its own range; edges.wrong: "
+       "trait "
+       "'fast' is named twice"},
+      {scratch.write("text.so", "hello\n"), "is not a shared library (it does not begin with an ELF header)"},
+      {truncated, "is truncated: its ELF header speaks of"}};
+  for (const auto& [file, reason] : rows)  // only where -mavx changes the alignment is there a library for it
+    if (file.filename() != "other_alignment.so" || fs::exists(file)) expect_refused(file, reason);
 }
 TEST_F(LibraryTest, OneBadLibraryLeavesTheOthersWorking) {
   copy_good(true);
@@ -111,26 +97,23 @@ TEST_F(LibraryTest, WithoutManifestItIsDescribedAndRemembered) {
   EXPECT_GT(marrow::library_info(file, framework).nodes.size(), 5u);
   EXPECT_FALSE(fs::is_empty(scratch.path / "cache" / "marrow" / "libraries"));
 }
-TEST_F(LibraryTest, StaleManifestIsNoticed) {
-  const fs::path file = copy_good(true);
-  std::ofstream(file, std::ios::app | std::ios::binary) << "another build";
-  const marrow::LibraryInfo info = marrow::library_info(file, framework);
-  EXPECT_EQ(info.note, "its manifest is stale (it belongs to another build of the library), so it was described again");
-  EXPECT_GT(info.nodes.size(), 5u);
-}
-TEST_F(LibraryTest, EditedManifestIsNoticed) {
+TEST_F(LibraryTest, ManifestsThatDoNotFitAreNoticed) {
   const fs::path file = copy_good(true), manifest = fs::path(file).replace_extension(".json");
-  std::string text = text_of(manifest);
-  text.replace(text.find("Keeps a core busy"), 5, "Burns");
-  std::ofstream(manifest) << text;
-  EXPECT_EQ(marrow::library_info(file, framework).note,
-            "its manifest is not used (it was edited by hand), so it was described again");
-}
-TEST_F(LibraryTest, DamagedManifestIsNoticed) {
-  const fs::path file = copy_good(true);
-  std::ofstream(fs::path(file).replace_extension(".json")) << "{";
-  EXPECT_EQ(marrow::library_info(file, framework).note,
-            "its manifest is not used (it is damaged: its text:1:2: not valid JSON), so it was described again");
+  std::string edited = text_of(manifest);
+  edited.replace(edited.find("Keeps a core busy"), 5, "Burns");
+  const std::string again = "), so it was described again";
+  const auto note = [&] {
+    const marrow::LibraryInfo info = marrow::library_info(file, framework);
+    EXPECT_GT(info.nodes.size(), 5u);
+    return info.note;
+  };
+  std::ofstream(manifest) << edited;
+  EXPECT_EQ(note(), "its manifest is not used (it was edited by hand" + again);
+  std::ofstream(manifest) << "{";
+  EXPECT_EQ(note(), "its manifest is not used (it is damaged: its text:1:2: not valid JSON" + again);
+  copy_good(true);
+  std::ofstream(file, std::ios::app | std::ios::binary) << "another build";
+  EXPECT_EQ(note(), "its manifest is stale (it belongs to another build of the library" + again);
 }
 TEST_F(LibraryTest, BuildIdFollowsTheLibraryAndTheFramework) {
   const fs::path file = copy_good(true);
@@ -142,81 +125,62 @@ TEST_F(LibraryTest, BuildIdFollowsTheLibraryAndTheFramework) {
 }
 
 TEST_F(LibraryTest, ElfHeadersThatLieAreRefused) {
-  expect_refused(copy_with_header([](Elf64_Ehdr& h) { h.e_shoff = UINT64_MAX - 100; }),
-                 "is truncated: its ELF header speaks of");
-  expect_refused(copy_with_header([](Elf64_Ehdr& h) { h.e_phoff = UINT64_MAX - 100; }),
-                 "is truncated: its ELF header speaks of");
-  expect_refused(copy_with_header([](Elf64_Ehdr& h) { h.e_phnum = 0; }),
-                 "its ELF header describes no program segments");
-  expect_refused(copy_with_header([](Elf64_Ehdr& h) { h.e_ident[EI_CLASS] = ELFCLASS32; }),
-                 "is not a 64 bit library; build it for this machine");
-  expect_refused(copy_with_header([](Elf64_Ehdr& h) { h.e_ident[EI_DATA] = ELFDATA2MSB; }),
-                 "has its bytes in another order than this machine");
-  expect_refused(copy_with_header([](Elf64_Ehdr& h) { h.e_machine = EM_RISCV; }),
-                 "was built for RISC-V, this machine is");
-  expect_refused(copy_with_header([](Elf64_Ehdr& h) { h.e_type = ET_REL; }),
-                 "is not a shared library (its ELF type is 1)");
+  const std::string truncated = "is truncated: its ELF header speaks of";
+  using Change = void (*)(Elf64_Ehdr&);
+  const std::vector<std::pair<Change, std::string>> rows{
+      {[](Elf64_Ehdr& h) { h.e_shoff = UINT64_MAX - 100; }, truncated},
+      {[](Elf64_Ehdr& h) { h.e_phoff = UINT64_MAX - 100; }, truncated},
+      {[](Elf64_Ehdr& h) { h.e_phnum = 0; }, "its ELF header describes no program segments"},
+      {[](Elf64_Ehdr& h) { h.e_ident[EI_CLASS] = ELFCLASS32; }, "is not a 64 bit library; build it for this machine"},
+      {[](Elf64_Ehdr& h) { h.e_ident[EI_DATA] = ELFDATA2MSB; }, "has its bytes in another order than this machine"},
+      {[](Elf64_Ehdr& h) { h.e_machine = EM_RISCV; }, "was built for RISC-V, this machine is"},
+      {[](Elf64_Ehdr& h) { h.e_type = ET_REL; }, "is not a shared library (its ELF type is 1)"}};
+  for (const auto& [change, reason] : rows) expect_refused(copy_with_header(change), reason);
   for (const std::uintmax_t size : {0, 3, 4, 5, 63, 64, 65, 500, 5000}) {
     const fs::path file = copy_good(false);
     fs::resize_file(file, size);
-    expect_refused(file, size < 4 ? "is not a shared library" : "is truncated: its ELF header speaks of");
+    expect_refused(file, size < 4 ? "is not a shared library" : truncated);
   }
-}
-TEST_F(LibraryTest, LibraryWithoutSectionsThatIsTruncated) {
   // Sections may be stripped; then only the segments tell how long the file must be.
   const fs::path file = copy_with_header([](Elf64_Ehdr& h) { h.e_shoff = h.e_shnum = 0; });
   fs::resize_file(file, 5000);
-  expect_refused(file, "is truncated: its ELF header speaks of");
+  expect_refused(file, truncated);
 }
 
-constexpr const char* kConstant = "nodes/test.constant";
 json& constant(json& j) { return j["nodes"][0]; }
 
-TEST_F(LibraryTest, InventedOptionIsFoundOut) {
+TEST_F(LibraryTest, InventionsAreFoundOut) {
+  const std::string of_constant = "nodes/test.constant/";
+  using Invent = void (*)(json&);
+  const std::vector<std::pair<Invent, std::string>> rows{
+      {[](json& j) {
+         constant(j)["options"][1]["type"] = "text", constant(j)["options"][1]["default"] = "x";
+         constant(j)["options"][1].erase("minimum");
+       },
+       of_constant + "options/count/default: the library has 0, its description has \"x\""},
+      {[](json& j) { constant(j)["options"][0]["default"] = 2.0; },
+       of_constant + "options/value/default: the library has 1.0, its description has 2.0"},
+      {[](json& j) {
+         constant(j)["options"].push_back(constant(j)["options"][0]), constant(j)["options"].back()["name"] = "more";
+       },
+       of_constant + "options: the library has 7 of them, its description has 8 of them"},
+      {[](json& j) { constant(j)["inputs"].push_back(j["nodes"][3]["inputs"][0]); },
+       of_constant + "inputs: the library has 0 of them, its description has 1 of them"},
+      {[](json& j) { j["nodes"][3]["inputs"][0]["type"]["size"] = 8; },
+       "nodes/test.add/inputs/a/type/size: the library has 24, its description has 8"},
+      {[](json& j) { constant(j)["random"] = true; },
+       of_constant + "random: the library has false, its description has true"},
+      {[](json& j) {
+         j["writers"].push_back({{"type", {{"id", "metrics"}, {"version", 1}, {"size", 24}, {"function", false}}},
+                                 {"extension", ".x"},
+                                 {"help", "x"}});
+       },
+       "writers/metrics: the library has none, its description has it"}};
+  for (const auto& [invent, reason] : rows) expect_load_refused(invent, reason);
+  const marrow::LinkedLibrary last = marrow::describe_library(kGood).linked.back();
   expect_load_refused(
-      [](json& j) {
-        constant(j)["options"][1]["type"] = "text", constant(j)["options"][1]["default"] = "x";
-        constant(j)["options"][1].erase("minimum");
-      },
-      std::string(kConstant) + "/options/count/default: the library has 0, its description has \"x\"");
-}
-TEST_F(LibraryTest, InventedDefaultIsFoundOut) {
-  expect_load_refused([](json& j) { constant(j)["options"][0]["default"] = 2.0; },
-                      std::string(kConstant) + "/options/value/default: the library has 1.0, its description has 2.0");
-}
-TEST_F(LibraryTest, OptionsThatTheLibraryDoesNotHave) {
-  expect_load_refused(
-      [](json& j) {
-        constant(j)["options"].push_back(constant(j)["options"][0]), constant(j)["options"].back()["name"] = "more";
-      },
-      std::string(kConstant) + "/options: the library has 7 of them, its description has 8 of them");
-}
-TEST_F(LibraryTest, PortsThatTheLibraryDoesNotHave) {
-  expect_load_refused([](json& j) { constant(j)["inputs"].push_back(j["nodes"][3]["inputs"][0]); },
-                      std::string(kConstant) + "/inputs: the library has 0 of them, its description has 1 of them");
-}
-TEST_F(LibraryTest, InventedTypeOfAnotherNodeIsFoundOut) {
-  expect_load_refused([](json& j) { j["nodes"][3]["inputs"][0]["type"]["size"] = 8; },
-                      "nodes/test.add/inputs/a/type/size: the library has 24, its description has 8");
-}
-TEST_F(LibraryTest, InventedRandomnessIsFoundOut) {
-  expect_load_refused([](json& j) { constant(j)["random"] = true; },
-                      std::string(kConstant) + "/random: the library has false, its description has true");
-}
-TEST_F(LibraryTest, InventedWriterIsFoundOut) {
-  expect_load_refused(
-      [](json& j) {
-        j["writers"].push_back({{"type", {{"id", "metrics"}, {"version", 1}, {"size", 24}, {"function", false}}},
-                                {"extension", ".x"},
-                                {"help", "x"}});
-      },
-      "writers/metrics: the library has none, its description has it");
-}
-TEST_F(LibraryTest, LinkedLibraryThatIsKeptBackIsFoundOut) {
-  const std::vector<marrow::LinkedLibrary> linked = marrow::describe_library(kGood).linked;
-  const std::string name = fs::path(linked.back().path).filename();
-  expect_load_refused([](json& j) { j["linked"].erase(j["linked"].size() - 1); },
-                      "it loads another " + name + " (" + std::to_string(linked.back().size) + " bytes)");
+      [](json& j) { j["linked"].erase(j["linked"].size() - 1); },
+      "it loads another " + fs::path(last.path).filename().string() + " (" + std::to_string(last.size) + " bytes)");
 }
 TEST_F(LibraryTest, LinkedLibraryOfTheSameSizeThatIsAnotherOneChangesTheBuildId) {
   const fs::path helper = scratch.write("libmarrow_helper.so", "first");
@@ -295,32 +259,14 @@ TEST_F(LinkedLibraryTest, TheSameLibraryInAnotherFolderLinksWhatIsBesideIt) {
     EXPECT_FALSE(linked.path.starts_with((fs::canonical(scratch.path) / "plugins").string())) << linked.path;
   EXPECT_EQ(build_id(), first);
 }
-/// The loader's manual (ld.so) says that the folders of a run path are searched in their order.
-TEST_F(LinkedLibraryTest, LibraryThatAppearsEarlierOnTheRunPathCounts) {
-  marrow::write_manifest(marrow::library_info(file, framework));
-  const marrow::Digest first = build_id();
-  const fs::path earlier = fs::canonical(scratch.path) / "plugins" / "earlier";
-  put(2, "libtest_base.so", earlier), put(1, "libtest_deep.so", earlier);
-  const marrow::LibraryInfo other = marrow::library_info(file, framework);
-  EXPECT_NE(other.build_id, first);
-  EXPECT_EQ(other.note, "its manifest is stale (" + (earlier / "libtest_base.so").string() +
-                            " has appeared, in a folder that is searched earlier), so it was described again");
-  EXPECT_EQ(build_id(), other.build_id) << "from the cache";
-  fs::remove_all(earlier);
-  EXPECT_EQ(build_id(), first);
-}
 TEST_F(LinkedLibraryTest, AnotherLibraryThanTheDescribedOneIsFoundOut) {
   marrow::write_manifest(marrow::library_info(file, framework));
   const marrow::Catalogue catalogue({scratch.path / "plugins"});
   put(2, "libtest_deep.so", scratch.path / "elsewhere");
   // Loaded before under the same name, it is what the plugin gets.
   ASSERT_NE(dlopen((scratch.path / "elsewhere" / "libtest_deep.so").c_str(), RTLD_NOW), nullptr);
-  try {
-    catalogue.load("test.linked");
-    ADD_FAILURE();
-  } catch (const marrow::Error& error) {
-    EXPECT_NE(std::string(error.what()).find("it loads another libtest_deep.so ("), std::string::npos) << error.what();
-  }
+  const std::string said = message_of([&] { catalogue.load("test.linked"); });
+  EXPECT_NE(said.find("it loads another libtest_deep.so ("), std::string::npos) << said;
 }
 TEST_F(LibraryTest, LinkedLibraryThatIsNoFileMakesTheManifestStale) {
   for (const std::string path : {"/dev/zero", "/", "/nonexistent/lib.so"}) {
@@ -332,12 +278,8 @@ TEST_F(LibraryTest, LibraryThatChangesAfterItWasDescribedIsNotUsed) {
   const fs::path file = copy_good(true);
   const marrow::Catalogue catalogue({scratch.path / "plugins"});
   std::ofstream(file, std::ios::app | std::ios::binary) << "another build";
-  try {
-    catalogue.load("test.add");
-    ADD_FAILURE();
-  } catch (const marrow::Error& error) {
-    EXPECT_EQ(std::string(error.what()), file.string() + " was changed since this program began; start it again");
-  }
+  EXPECT_EQ(message_of([&] { catalogue.load("test.add"); }),
+            file.string() + " was changed since this program began; start it again");
 }
 TEST_F(LibraryTest, WrongDescriptionInTheCacheIsForgotten) {
   const fs::path file = copy_with_invented([](json&j) { constant(j)["random"] = true; }),

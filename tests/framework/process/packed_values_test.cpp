@@ -8,6 +8,7 @@
 
 #include "marrow/runtime/node/types.hpp"
 #include "tests/framework/fixture.hpp"
+#include "tests/harness/message_of.hpp"
 
 namespace packed_values_test {
 
@@ -18,12 +19,7 @@ using runtime_fixture::Scratch;
 Value some_metrics() { return Value::of<Metrics>(std::make_shared<const Metrics>(Metrics{{{"a", 1.5, "mm"}}})); }
 
 std::string refusal(int descriptor) {
-  try {
-    marrow::read_values(descriptor, getpid(), marrow::content_of_own);
-  } catch (const marrow::Error& error) {
-    return error.what();
-  }
-  return "";
+  return marrow::test::message_of([&] { marrow::read_values(descriptor, getpid(), marrow::content_of_own); });
 }
 
 TEST(PackedValues, ComeBack) {

@@ -12,12 +12,13 @@
 #include <fstream>
 #include <thread>
 
-#include "marrow/base/error.hpp"
+#include "tests/harness/message_of.hpp"
 
 namespace worker_test {
 
 using marrow::Worker;
 using marrow::WorkerEnd;
+using marrow::test::message_of;
 using nlohmann::json;
 
 WorkerEnd ask(Worker& worker, json request, double seconds = 120, double memory_mb = 1000) {
@@ -193,12 +194,8 @@ TEST(Worker, SignalsOfTheProgramLoseNoEnd) {
 }
 
 TEST(Worker, ProgramThatIsNotThereIsSaid) {
-  try {
-    Worker worker({{"/nowhere/marrow-worker"}});
-    FAIL();
-  } catch (const marrow::Error& error) {
-    EXPECT_STREQ(error.what(), "cannot start /nowhere/marrow-worker: No such file or directory; install marrow again");
-  }
+  EXPECT_EQ(message_of([] { Worker worker({{"/nowhere/marrow-worker"}}); }),
+            "cannot start /nowhere/marrow-worker: No such file or directory; install marrow again");
 }
 
 TEST(Worker, ALowLimitOfFilesIsSaid) {

@@ -9,36 +9,26 @@
 #include <thread>
 
 #include "marrow/runtime/process/worker.hpp"
-#include "tests/framework/fixture.hpp"
+#include "tests/framework/run_fixture.hpp"
 
 namespace apart_test {
 
 using marrow::NodeRecord;
 using marrow::RunEvent;
 using marrow::RunResult;
-using runtime_fixture::Scratch;
-using runtime_fixture::test_catalogue;
 
-class ApartTest : public testing::Test {
+class ApartTest : public run_fixture::RunTest {
  protected:
-  RunResult run(const std::string& word, const std::string& more = "") {
+  RunResult read_word(const std::string& word, const std::string& more = "") {
     file = scratch.write("file.txt", word);
-    marrow::Diagnostics diagnostics;
-    const auto path = scratch.write(
-        "p.yaml",
-        "marrow: 1\nnodes:\n  r: {uses: parse.test_number, with: {path: file.txt, value: 1.25, words: [one, two, "
-        "three]}" +
-            more + "}\n  other: {uses: test.constant, with: {value: 5}}\noutputs: {r: r, other: other}\n");
-    pipeline = marrow::read_pipeline(path, {}, test_catalogue(), diagnostics);
-    EXPECT_TRUE(diagnostics.empty()) << diagnostics.text();
-    settings.threads = 2;
-    settings.observer = [this](const RunEvent& event) { events.push_back(event); };
-    return marrow::run_pipeline(pipeline, test_catalogue(), settings);
+    return run("  r: {uses: parse.test_number, with: {path: file.txt, value: 1.25, words: [one, two, three]}" + more +
+                   "}\n  other: {uses: test.constant, with: {value: 5}}\n",
+               "r: r, other: other");
   }
   /// Why the reader failed, from the file's name on; everything else must have gone on.
   std::string failure(const std::string& word, const std::string& more = "") {
-    const RunResult result = run(word, more);
-    EXPECT_EQ(value(result, 1), 5);
+    const RunResult result = read_word(word, more);
+    EXPECT_EQ(number(result, 1), 5);
     for (std::size_t i = 0; i < result.nodes.size(); ++i)
       if (result.nodes[i].status == NodeRecord::Status::failed) {
         const std::string reason = result.nodes[i].reason;
@@ -47,30 +37,22 @@ class ApartTest : public testing::Test {
       }
     return "";
   }
-  double value(const RunResult& result, std::size_t output, std::size_t item = 0) {
-    return marrow::value_of(result, pipeline.outputs[output].source).as<marrow::Metrics>().items.at(item).value;
-  }
-  Scratch scratch;
+  double value(const RunResult& result, std::size_t item = 0) const { return number_of(output(result), item); }
   std::filesystem::path file;
-  marrow::Pipeline pipeline;
-  marrow::RunSettings settings;
-  std::vector<RunEvent> events;
 };
 
 TEST_F(ApartTest, GivesWhatTheNodeGives) {
-  const RunResult result = run("hello");
-  EXPECT_NE(pid_t(value(result, 0, 1)), getpid());
-  EXPECT_EQ(value(result, 0, 2), 11) << "letters of the words";
-  const double drawn = value(result, 0) - 1.25;
+  const RunResult result = read_word("hello");
+  EXPECT_NE(pid_t(value(result, 1)), getpid());
+  EXPECT_EQ(value(result, 2), 11) << "letters of the words";
+  const double drawn = value(result) - 1.25;
   EXPECT_EQ(drawn, std::floor(drawn));
   settings.seed = 4;
-  EXPECT_NE(value(run("hello"), 0), value(result, 0));
-  const double with_input = value(run("hello", ", in: {added: other}"), 0) - 1.25;
+  EXPECT_NE(value(read_word("hello")), value(result));
+  const double with_input = value(read_word("hello", ", in: {added: other}")) - 1.25;
   EXPECT_EQ(with_input, std::floor(with_input));
   EXPECT_GE(with_input, 5);
-  EXPECT_TRUE(std::any_of(events.begin(), events.end(), [](const RunEvent& event) {
-    return event.kind == RunEvent::Kind::warning && event.text == "a warning of hello";
-  }));
+  EXPECT_TRUE(was_said(RunEvent::Kind::warning, "a warning of hello"));
   EXPECT_TRUE(std::any_of(events.begin(), events.end(), [](const RunEvent& event) {
     return event.kind == RunEvent::Kind::progress && event.fraction == 0.5 && event.text == "half";
   }));
@@ -91,14 +73,16 @@ TEST_F(ApartTest, ProcessThatWasKilledFromOutsideIsNoFaultOfTheFile) {
             "nothing is known against the file");
 }
 
-TEST_F(ApartTest, ReadersAndWhatTheyStartFindNothingOnTheStandardInput) { EXPECT_EQ(value(run("listen"), 0, 2), 11); }
+TEST_F(ApartTest, ReadersAndWhatTheyStartFindNothingOnTheStandardInput) {
+  EXPECT_EQ(value(read_word("listen"), 2), 11);
+}
 
 TEST_F(ApartTest, WhatAReaderSaysIsUnderstood) {
-  const RunResult result = run("nan");
+  const RunResult result = read_word("nan");
   EXPECT_TRUE(std::any_of(result.nodes.begin(), result.nodes.end(), [](const NodeRecord& node) {
     return node.reason == "it reports a progress that is not finite; expected a number from 0 to 1";
   }));
-  run("flood");
+  read_word("flood");
   EXPECT_TRUE(std::any_of(events.begin(), events.end(), [](const RunEvent& event) {
     return event.kind == RunEvent::Kind::message && event.text.ends_with("xxx... (68951424 more bytes)");
   }));  // 70,000,000 less 2^20
@@ -143,7 +127,7 @@ TEST_F(ApartTest, TimeIsLimitedByTheFilesSize) {
 }
 
 TEST_F(ApartTest, LimitsFollowTheSize) {
-  run("hello");
+  read_word("hello");
   const double slower = marrow::abi_stamp().sanitizers ? 20 : 1;
   const auto expect = [&](double bytes, double memory_mb, double processor_s) {
     const marrow::CallLimits limits = marrow::limits_of(pipeline.nodes[0], bytes, settings);
@@ -169,7 +153,7 @@ TEST_F(ApartTest, CtrlCEndsTheProcess) {
     std::this_thread::sleep_for(std::chrono::milliseconds(300));
     cancelled = true;
   });
-  const RunResult result = run("sleep");
+  const RunResult result = read_word("sleep");
   stop.join();
   EXPECT_TRUE(result.cancelled());
 }
@@ -192,18 +176,13 @@ TEST_F(ApartTest, NodesOfOneRunDoNotMixContents) {
   const auto run_with_edit = [&](const char* first, const char* second, const std::function<void()>& edit) {
     std::filesystem::create_directory(scratch.path / "folder");
     file = scratch.write("folder/file.txt", "one");
-    marrow::Diagnostics diagnostics;
-    const auto path =
-        scratch.write("p.yaml", std::string("marrow: 1\nnodes:\n  c: {uses: test.constant, with: {path: ") + first +
-                                    "}}\n  r: {uses: parse.test_number, in: {added: c}, with: {path: " + second +
-                                    "}}\noutputs: {r: r, c: c}\n");
-    pipeline = marrow::read_pipeline(path, {}, test_catalogue(), diagnostics);
-    EXPECT_TRUE(diagnostics.empty()) << diagnostics.text();
-    settings.threads = 2;
-    settings.observer = [&](const RunEvent& event) {
+    on_event = [&](const RunEvent& event) {
       if (event.kind == RunEvent::Kind::finished && event.node == "c") edit();
     };
-    const RunResult result = marrow::run_pipeline(pipeline, test_catalogue(), settings);
+    const RunResult result =
+        run(std::string("  c: {uses: test.constant, with: {path: ") + first +
+                "}}\n  r: {uses: parse.test_number, in: {added: c}, with: {path: " + second + "}}\n",
+            "r: r, c: c");
     EXPECT_EQ(result.nodes[0].status, NodeRecord::Status::done);
     return result.nodes[1].reason;
   };
@@ -226,12 +205,7 @@ TEST_F(ApartTest, FolderThatCannotBeHashedIsOneNodesError) {
   std::filesystem::create_directory(scratch.path / "case");
   std::filesystem::create_directory(scratch.path / "elsewhere");
   std::filesystem::create_directory_symlink(scratch.path / "elsewhere", scratch.path / "case" / "link");
-  settings.threads = 2;
-  const auto path = scratch.write(
-      "p2.yaml", "marrow: 1\nnodes:\n  r: {uses: parse.test_number, with: {path: case}}\noutputs: {r: r}\n");
-  marrow::Diagnostics diagnostics;
-  pipeline = marrow::read_pipeline(path, {}, test_catalogue(), diagnostics);
-  const RunResult result = marrow::run_pipeline(pipeline, test_catalogue(), settings);
+  const RunResult result = run("  r: {uses: parse.test_number, with: {path: case}}\n", "r: r");
   EXPECT_EQ(result.nodes[0].reason, (scratch.path / "case" / "link").string() + ": is a link to a place outside " +
                                         std::filesystem::canonical(scratch.path / "case").string() +
                                         "; copy it into the folder");

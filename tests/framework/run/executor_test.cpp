@@ -2,54 +2,26 @@
 #include <sys/mman.h>
 
 #include <atomic>
-#include <functional>
 #include <utility>
 
 #include "marrow/runtime/run/run_folder.hpp"
-#include "tests/framework/fixture.hpp"
+#include "tests/framework/run_fixture.hpp"
+#include "tests/harness/message_of.hpp"
 
 namespace executor_test {
 
 using marrow::NodeRecord;
-using marrow::Pipeline;
 using marrow::RunEvent;
 using marrow::RunResult;
-using runtime_fixture::Scratch;
-using runtime_fixture::test_catalogue;
+using marrow::test::message_of;
 using Status = NodeRecord::Status;
 
-class ExecutorTest : public testing::Test {
+class ExecutorTest : public run_fixture::RunTest {
  protected:
-  RunResult run(const std::string& nodes, const std::string& outputs, std::uint64_t seed = 1, int threads = 2) {
-    marrow::Diagnostics diagnostics;
-    pipeline =
-        marrow::read_pipeline(scratch.write("p.yaml", "marrow: 1\nnodes:\n" + nodes + "outputs: {" + outputs + "}\n"),
-                              {}, test_catalogue(), diagnostics);
-    EXPECT_TRUE(diagnostics.empty()) << diagnostics.text();
+  double drawn(const std::string& node, std::uint64_t seed) {
     settings.seed = seed;
-    settings.threads = threads;
-    settings.observer = [this](const RunEvent& event) {
-      events.push_back(event);
-      if (on_event) on_event(event);
-    };
-    return marrow::run_pipeline(pipeline, test_catalogue(), settings);
+    return number(run("  " + node + ": {uses: test.draw}\n", "o: " + node));
   }
-  marrow::Value output(const RunResult& result, std::size_t index = 0) {
-    return marrow::value_of(result, pipeline.outputs[index].source);
-  }
-  double number(const RunResult& result, std::size_t index = 0) {
-    return output(result, index).as<marrow::Metrics>().items[0].value;
-  }
-  std::string event_text(RunEvent::Kind kind) {
-    for (const RunEvent& event : events)
-      if (event.kind == kind) return event.text;
-    return "";
-  }
-  Scratch scratch;
-  Pipeline pipeline;
-  marrow::RunSettings settings;
-  std::vector<RunEvent> events;
-  std::function<void(const RunEvent&)> on_event;
 };
 
 TEST_F(ExecutorTest, AddsAlongTheGraph) {
@@ -69,14 +41,14 @@ TEST_F(ExecutorTest, MapsOverListsInStepAndNested) {
   const marrow::Value step = output(result, 0);
   ASSERT_EQ(step.names, (std::vector<std::string>{"a", "b"}));
   EXPECT_EQ(step.type, marrow::TypeInfo::of<marrow::Metrics>());
-  EXPECT_EQ(step.items[1].as<marrow::Metrics>().items[0].value, 40);
+  EXPECT_EQ(number_of(step.items[1]), 40);
   const marrow::Value nest = output(result, 1);
   ASSERT_EQ(nest.axis, "side");
   ASSERT_EQ(nest.items[0].axis, "letter");
-  EXPECT_EQ(nest.items[1].items[2].as<marrow::Metrics>().items[0].value, 320);
+  EXPECT_EQ(number_of(nest.items[1].items[2]), 320);
   const marrow::Value sum = output(result, 2);
   ASSERT_EQ(sum.axis, "letter");
-  EXPECT_EQ(sum.items[0].as<marrow::Metrics>().items[0].value, 10 + 100 + 20 + 100);
+  EXPECT_EQ(number_of(sum.items[0]), 10 + 100 + 20 + 100);
 }
 
 TEST_F(ExecutorTest, PicksOneItemByName) {
@@ -121,7 +93,7 @@ TEST_F(ExecutorTest, FailureNamesNodeInputsAndReasonAndLeavesOthersGoing) {
       event_text(RunEvent::Kind::failed),
       "node 'f' (test.fail_above) for b failed: the number is too large; give a smaller one (its inputs: a = s.both)");
   const marrow::Value g = output(result, 0);
-  EXPECT_EQ(g.items[0].as<marrow::Metrics>().items[0].value, 10) << "the item that did not fail goes on";
+  EXPECT_EQ(number_of(g.items[0]), 10) << "the item that did not fail goes on";
   EXPECT_EQ(g.items[1].missing, "node 'f' failed");
   EXPECT_EQ(result.nodes[3].status, Status::not_run);
   EXPECT_EQ(number(result, 2), 1);
@@ -227,9 +199,9 @@ TEST_F(ExecutorTest, FunctionKeepsItsInputsAlive) {
 }
 
 TEST_F(ExecutorTest, SeedDecidesRandomNodesAlone) {
-  const double first = number(run("  d: {uses: test.draw}\n", "o: d", 1));
-  EXPECT_EQ(first, number(run("  other_name: {uses: test.draw}\n", "o: other_name", 1))) << "a name changes nothing";
-  EXPECT_NE(first, number(run("  d: {uses: test.draw}\n", "o: d", 2)));
+  const double first = drawn("d", 1);
+  EXPECT_EQ(first, drawn("other_name", 1)) << "a name changes nothing";
+  EXPECT_NE(first, drawn("d", 2));
 }
 
 TEST_F(ExecutorTest, IndependentNodesOverlap) {
@@ -277,26 +249,16 @@ TEST_F(ExecutorTest, CancelStopsWithinANode) {
 TEST_F(ExecutorTest, RunFolderRefusesToOverwrite) {
   run("  c: {uses: test.constant}\n", "o: c");
   scratch.write("something", "here");
-  try {
-    marrow::RunFolder folder(scratch.path, pipeline);
-    FAIL();
-  } catch (const marrow::Error& error) {
-    EXPECT_NE(std::string(error.what()).find("is already there and not empty; choose another with --out"),
-              std::string::npos)
-        << error.what();
-  }
+  const std::string said = message_of([&] { marrow::RunFolder folder(scratch.path, pipeline); });
+  EXPECT_NE(said.find("is already there and not empty; choose another with --out"), std::string::npos) << said;
   EXPECT_TRUE(std::filesystem::exists(scratch.path / "something"));
 }
 
 TEST_F(ExecutorTest, RunFolderThatCannotBeMade) {
   run("  c: {uses: test.constant}\n", "o: c");
   scratch.write("file", "");
-  try {
-    marrow::RunFolder folder(scratch.path / "file" / "below", pipeline);
-    FAIL();
-  } catch (const marrow::Error& error) {
-    EXPECT_NE(std::string(error.what()).find("cannot make the output folder"), std::string::npos) << error.what();
-  }
+  const std::string said = message_of([&] { marrow::RunFolder folder(scratch.path / "file" / "below", pipeline); });
+  EXPECT_NE(said.find("cannot make the output folder"), std::string::npos) << said;
 }
 
 }  // namespace executor_test

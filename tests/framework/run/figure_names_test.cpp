@@ -1,13 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 // The names of figures that a node declares: the declaration, the manifest, and a node that makes another figure.
 #include "marrow/runtime/run/output_faults.hpp"
-#include "tests/framework/fixture.hpp"
+#include "tests/framework/run_fixture.hpp"
 
 namespace figure_names_test {
 
 using marrow::Metrics;
 using marrow::PortInfo;
-using runtime_fixture::Scratch;
 
 const marrow::Catalogue& catalogue() {
   static const marrow::Catalogue figures({std::filesystem::path(MARROW_BINARY_DIR) / "tests" / "plugins",
@@ -33,30 +32,23 @@ TEST(FigureNames, AStarStandsForAnyText) {
     EXPECT_FALSE(may_have_figure(port, name)) << name;
 }
 
-struct Ended {
-  bool failed;
-  std::string reason;
+class FiguresOfARun : public run_fixture::RunTest {
+ protected:
+  const marrow::Catalogue& catalogue() const override { return figure_names_test::catalogue(); }
+  marrow::RunResult run_also(const std::string& node, const std::string& also) {
+    return run("  c: {uses: test.constant}\n  n: {uses: " + node + ", in: {of: c}, with: {also: " + also + "}}\n",
+               "figures: n");
+  }
 };
-Ended run(const std::string& node, const std::string& also) {
-  const Scratch scratch;
-  marrow::Diagnostics diagnostics;
-  const marrow::Pipeline pipeline = marrow::read_pipeline(
-      scratch.write("p.yaml", "marrow: 1\nnodes:\n  c: {uses: test.constant}\n  n: {uses: " + node +
-                                  ", in: {of: c}, with: {also: " + also + "}}\noutputs: {figures: n}\n"),
-      {}, catalogue(), diagnostics);
-  EXPECT_TRUE(diagnostics.empty()) << diagnostics.text();
-  const marrow::RunResult result = marrow::run_pipeline(pipeline, catalogue(), {});
-  return {result.failed(), result.nodes.back().reason};
-}
 
-TEST(FigureNames, ANodeThatMakesAnotherFigureFails) {
-  const Ended other = run("test.declared", "odd_mm");
-  EXPECT_TRUE(other.failed);
-  EXPECT_EQ(other.reason,
+TEST_F(FiguresOfARun, MustBeAmongTheDeclared) {
+  const marrow::RunResult other = run_also("test.declared", "odd_mm");
+  EXPECT_TRUE(other.failed());
+  EXPECT_EQ(other.nodes.back().reason,
             "it gave an output 'metrics' that cannot be: the figure 'odd_mm' is not among those that its declaration "
             "names");
-  EXPECT_FALSE(run("test.declared", "lateral.median_px").failed);
-  EXPECT_FALSE(run("test.undeclared", "odd_mm").failed);
+  EXPECT_FALSE(run_also("test.declared", "lateral.median_px").failed());
+  EXPECT_FALSE(run_also("test.undeclared", "odd_mm").failed());
 }
 
 Metrics figures() { return {}; }

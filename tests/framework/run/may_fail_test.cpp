@@ -23,27 +23,17 @@ class MayFailTest : public store_fixture::StoreTest {
  protected:
   RunResult run(const std::string& nodes, const std::string& outputs) {
     failures.clear();
-    read(nodes, outputs);
-    settings.threads = 2;
     settings.store = &store;
-    settings.observer = [this](const RunEvent& event) {
+    on_event = [this](const RunEvent& event) {
       if (event.kind == RunEvent::Kind::failed) failures[event.text] = event.level;
     };
-    return marrow::run_pipeline(pipeline, runtime_fixture::test_catalogue(), settings);
-  }
-  const NodeRecord& record(const RunResult& result, const std::string& id) const {
-    for (std::size_t i = 0; i < pipeline.nodes.size(); ++i)
-      if (pipeline.nodes[i].id == id) return result.nodes[i];
-    throw marrow::Error("no node " + id);
+    return RunTest::run(nodes, outputs);
   }
   PlannedNode planned(const std::string& id, const std::string& nodes, const std::string& outputs) {
     const std::vector<PlannedNode> all = plan(nodes, outputs);
     for (std::size_t i = 0; i < pipeline.nodes.size(); ++i)
       if (pipeline.nodes[i].id == id) return all[i];
     throw marrow::Error("no node " + id);
-  }
-  marrow::Value output(const RunResult& result, std::size_t index = 0) const {
-    return marrow::value_of(result, pipeline.outputs[index].source);
   }
   std::map<std::string, LogLevel> failures;
 };
@@ -103,10 +93,10 @@ TEST_F(MayFailTest, AlongAnAxisOnlyTheFailedItemIsMissing) {
   EXPECT_EQ(record(result, "g").status, Status::failed_alone);
   EXPECT_EQ(record(result, "g").reason, "b: it needs 'a', but node 'f' failed");
   ASSERT_EQ(output(result, 0).names, (std::vector<std::string>{"a", "b"}));
-  EXPECT_EQ(output(result, 0).items[0].as<marrow::Metrics>().items[0].value, 10);
+  EXPECT_EQ(number_of(output(result, 0).items[0]), 10);
   EXPECT_TRUE(output(result, 0).items[1].may_be_missing);
-  EXPECT_EQ(output(result, 1).items[0].as<marrow::Metrics>().items[0].value, 10 + 10);
-  EXPECT_EQ(output(result, 1).items[1].as<marrow::Metrics>().items[0].value, 20);
+  EXPECT_EQ(number_of(output(result, 1).items[0]), 10 + 10);
+  EXPECT_EQ(number_of(output(result, 1).items[1]), 20);
 }
 
 TEST_F(MayFailTest, AListWithoutAnItemIsNotThereAtAll) {
@@ -262,7 +252,7 @@ TEST_F(MayFailTest, WhatIsCalledForItemsThatNobodyKnowsFails) {
   EXPECT_FALSE(result.failed());
   EXPECT_EQ(record(result, "g").reason, "it is called for each side of 'f', but node 'f' failed");
   EXPECT_EQ(result_of(result), 5);
-  EXPECT_EQ(output(result, 1).items[1].as<marrow::Metrics>().items[0].value, 20) << "s says which items there are";
+  EXPECT_EQ(number_of(output(result, 1).items[1]), 20) << "s says which items there are";
 }
 
 TEST_F(MayFailTest, StoppedCountsMoreThanFailedAlone) {

@@ -29,23 +29,15 @@ class RepetitionTest : public store_fixture::StoreTest {
 
   std::vector<double> numbers(const Value& list) {
     std::vector<double> result;
-    for (const Value& item : list.items) result.push_back(item.is_absent() ? -1 : item.as<Metrics>().items[0].value);
+    for (const Value& item : list.items) result.push_back(item.is_absent() ? -1 : number_of(item));
     return result;
-  }
-  Value output(const RunResult& result, std::size_t index = 0) {
-    return marrow::value_of(result, pipeline.outputs[index].source);
-  }
-  const NodeRecord& record(const RunResult& result, const std::string& id) {
-    for (std::size_t i = 0; i < pipeline.nodes.size(); ++i)
-      if (pipeline.nodes[i].id == id) return result.nodes[i];
-    throw marrow::Error("no node " + id);
   }
   static const NodeRecord& of_body(const NodeRecord& record, std::size_t index) { return record.passes->nodes[index]; }
 
   std::string faults(const std::string& nodes, const std::string& outputs = "o: r") {
     marrow::Diagnostics diagnostics;
     marrow::read_pipeline(scratch.write("p.yaml", "marrow: 1\nnodes:\n" + nodes + "outputs: {" + outputs + "}\n"), {},
-                          store_fixture::test_catalogue(), diagnostics);
+                          catalogue(), diagnostics);
     return diagnostics.text();
   }
 };
@@ -60,7 +52,7 @@ TEST_F(RepetitionTest, CarriesFromItemToItem) {
   EXPECT_EQ(output(result).axis, "letter");
   EXPECT_EQ(output(result).names, (std::vector<std::string>{"x", "y", "z"}));
   EXPECT_EQ(numbers(output(result)), (std::vector<double>{101, 301, 601}));
-  EXPECT_EQ(output(result, 1).as<Metrics>().items[0].value, 601);
+  EXPECT_EQ(number(result, 1), 601);
   const NodeRecord& node = record(result, "r");
   ASSERT_TRUE(node.passes);
   EXPECT_EQ(node.passes->passes.size(), 3u);
@@ -114,10 +106,10 @@ TEST_F(RepetitionTest, ALoopEndsByItsRuleOrItsLimit) {
   EXPECT_EQ(numbers(output(result)), (std::vector<double>{6, 12, 24}));
   EXPECT_EQ(output(result).axis, "pass");
   EXPECT_EQ(output(result).names, (std::vector<std::string>{"1", "2", "3"}));
-  EXPECT_EQ(output(result, 1).as<Metrics>().items[0].value, 24);
+  EXPECT_EQ(number(result, 1), 24);
   EXPECT_EQ(record(result, "r").passes->end, "it is above 20");
   const RunResult shorter = run("  r:\n" + body + "    at_most: 2\n", "last: r.last_number");
-  EXPECT_EQ(output(shorter).as<Metrics>().items[0].value, 12);
+  EXPECT_EQ(number(shorter), 12);
   EXPECT_EQ(record(shorter, "r").passes->end, "there were 2 passes, which is the limit");
 }
 
@@ -141,7 +133,7 @@ outputs: {sum: sum}
   const RunResult result = run(nodes + ", if_pass_fails: go_on}\n", "all: r.sum, last: r.last_sum");
   EXPECT_FALSE(result.failed()) << messages;
   EXPECT_EQ(numbers(output(result)), (std::vector<double>{100, -1, -1}));
-  EXPECT_EQ(output(result, 1).as<Metrics>().items[0].value, 100);
+  EXPECT_EQ(number(result, 1), 100);
   EXPECT_EQ(record(result, "r").passes->passes[1].status, Status::failed);
 }
 
@@ -170,8 +162,15 @@ nodes:
   inner: {repeat: sum.yaml, over: side, in: {item: l.both, before: item}, carry: {before: sum}}
 outputs: {total: inner.last_sum}
 )");
-  const std::string nodes = "  l: {uses: test.letters}\n  r: {repeat: outer.yaml, over: letter, in: {item: l}}\n";
-  EXPECT_EQ(numbers(output(run(nodes, "all: r.total"))), (std::vector<double>{130, 230, 330}));
+  const RunResult result =
+      run("  l: {uses: test.letters}\n  r: {repeat: outer.yaml, over: letter, in: {item: l}}\n", "all: r.total");
+  EXPECT_EQ(numbers(output(result)), (std::vector<double>{130, 230, 330}));
+  const NodeRecord& inner = of_body(record(result, "r"), 2);
+  ASSERT_TRUE(inner.passes);
+  std::vector<std::string> names;
+  for (const auto& pass : inner.passes->passes) names.push_back(pass.name);
+  EXPECT_EQ(names, (std::vector<std::string>{"x/a", "x/b", "y/a", "y/b", "z/a", "z/b"}));
+  EXPECT_EQ(of_body(inner, 2).calls, 6);
 }
 
 TEST_F(RepetitionTest, OnePassCarriesNothing) {
@@ -182,7 +181,7 @@ TEST_F(RepetitionTest, OnePassCarriesNothing) {
   EXPECT_EQ(messages, "");
   EXPECT_EQ(output(result).axis, "once");
   EXPECT_EQ(numbers(output(result)), (std::vector<double>{8}));
-  EXPECT_EQ(output(result, 1).as<Metrics>().items[0].value, 8);
+  EXPECT_EQ(number(result, 1), 8);
 }
 
 TEST_F(RepetitionTest, OnePassMayHoldALoop) {
@@ -197,10 +196,10 @@ TEST_F(RepetitionTest, OnePassMayHoldALoop) {
   EXPECT_EQ(messages, "");
   EXPECT_EQ(output(result).axis, "pass");
   EXPECT_EQ(numbers(output(result)), (std::vector<double>{3, 5, 7}));
-  EXPECT_EQ(output(result, 1).as<Metrics>().items[0].value, 7);
+  EXPECT_EQ(number(result, 1), 7);
   EXPECT_EQ(numbers(output(result, 2)), (std::vector<double>{5, 7, 9}));
   ASSERT_FALSE(output(result, 3).is_absent()) << "the loop makes all that the pass gives out";
-  EXPECT_EQ(output(result, 3).as<Metrics>().items[0].value, 9);
+  EXPECT_EQ(number(result, 3), 9);
   EXPECT_EQ(record(result, "o").passes->end, "there was one pass, which is the limit");
 }
 
@@ -209,15 +208,15 @@ TEST_F(RepetitionTest, OverridesReachIntoTheBody) {
   marrow::PipelineArguments arguments;
   arguments.overrides = {{"r.body.before.value", "40"}};
   const auto file = scratch.write("p.yaml", std::string("marrow: 1\nnodes:\n") + kOver + "outputs: {all: r.sum}\n");
-  pipeline = marrow::read_pipeline(file, arguments, store_fixture::test_catalogue(), diagnostics);
+  pipeline = marrow::read_pipeline(file, arguments, catalogue(), diagnostics);
   ASSERT_TRUE(diagnostics.empty()) << diagnostics.text();
   settings.store = nullptr;
-  EXPECT_EQ(numbers(output(marrow::run_pipeline(pipeline, store_fixture::test_catalogue(), settings))),
+  EXPECT_EQ(numbers(output(marrow::run_pipeline(pipeline, catalogue(), settings))),
             (std::vector<double>{140, 340, 640}));
   const auto resolved = scratch.write("resolved.yaml", marrow::resolved_yaml(pipeline));
-  pipeline = marrow::read_pipeline(resolved, {}, store_fixture::test_catalogue(), diagnostics);
+  pipeline = marrow::read_pipeline(resolved, {}, catalogue(), diagnostics);
   ASSERT_TRUE(diagnostics.empty()) << diagnostics.text() << marrow::resolved_yaml(pipeline);
-  EXPECT_EQ(numbers(output(marrow::run_pipeline(pipeline, store_fixture::test_catalogue(), settings))),
+  EXPECT_EQ(numbers(output(marrow::run_pipeline(pipeline, catalogue(), settings))),
             (std::vector<double>{140, 340, 640}));
 }
 
@@ -253,7 +252,7 @@ TEST_F(RepetitionTest, AnInputWithoutAValueIsNoFaultOfTheBody) {
   std::string outer = std::string("marrow: 1\n") + kInput + "nodes:\n" + kOver + "outputs: {all: r.sum}\n";
   outer.insert(outer.find("in: {item"), "with: {amount: $amount}, ");
   marrow::Diagnostics diagnostics;
-  marrow::read_pipeline(scratch.write("p.yaml", outer), {}, store_fixture::test_catalogue(), diagnostics, false);
+  marrow::read_pipeline(scratch.write("p.yaml", outer), {}, catalogue(), diagnostics, false);
   EXPECT_EQ(diagnostics.text(), "") << "checked before it has its data";
 }
 
@@ -274,31 +273,13 @@ outputs: {sum: sum}
   EXPECT_EQ(record(result, "r").reason, "node 'good' of the body failed: the number is too large; give a smaller one");
 }
 
-TEST_F(RepetitionTest, ABodyInABodyHasItsRecord) {
-  scratch.write("outer.yaml", R"(marrow: 1
-nodes:
-  item: {uses: test.constant}
-  l: {uses: test.sides}
-  inner: {repeat: sum.yaml, over: side, in: {item: l.both, before: item}, carry: {before: sum}}
-outputs: {total: inner.last_sum}
-)");
-  const RunResult result =
-      run("  l: {uses: test.letters}\n  r: {repeat: outer.yaml, over: letter, in: {item: l}}\n", "all: r.total");
-  const NodeRecord& inner = of_body(record(result, "r"), 2);
-  ASSERT_TRUE(inner.passes);
-  std::vector<std::string> names;
-  for (const auto& pass : inner.passes->passes) names.push_back(pass.name);
-  EXPECT_EQ(names, (std::vector<std::string>{"x/a", "x/b", "y/a", "y/b", "z/a", "z/b"}));
-  EXPECT_EQ(of_body(inner, 2).calls, 6);
-}
-
 TEST_F(RepetitionTest, OneThreadAndTwoGiveTheSame) {
   settings.store = nullptr;
   std::vector<std::vector<double>> all;
   for (const int threads : {1, 2, 4}) {
     read(kOver, "all: r.sum");
     settings.threads = threads;
-    all.push_back(numbers(output(marrow::run_pipeline(pipeline, store_fixture::test_catalogue(), settings))));
+    all.push_back(numbers(output(marrow::run_pipeline(pipeline, catalogue(), settings))));
   }
   EXPECT_EQ(all[0], all[1]);
   EXPECT_EQ(all[0], all[2]);

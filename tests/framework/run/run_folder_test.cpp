@@ -11,13 +11,15 @@
 #include <set>
 #include <thread>
 
-#include "tests/framework/fixture.hpp"
+#include "tests/framework/run_fixture.hpp"
+#include "tests/harness/message_of.hpp"
 #include "tests/plugins/write/full_disk.hpp"
 
 namespace run_folder_test {
 
 namespace fs = std::filesystem;
 using marrow::RunFolder;
+using marrow::test::message_of;
 using runtime_fixture::Scratch;
 using runtime_fixture::test_catalogue;
 
@@ -40,25 +42,12 @@ const marrow::Catalogue& writing_catalogue() {
   return catalogue;
 }
 
-class RunFolderTest : public testing::Test {
+class RunFolderTest : public run_fixture::RunTest {
  protected:
   marrow::Pipeline pipeline_of(const std::string& nodes, const std::string& outputs) {
-    marrow::Diagnostics diagnostics;
-    const marrow::Pipeline pipeline =
-        marrow::read_pipeline(scratch.write("p.yaml", "marrow: 1\nnodes:\n" + nodes + "outputs: {" + outputs + "}\n"),
-                              {}, test_catalogue(), diagnostics);
-    EXPECT_TRUE(diagnostics.empty()) << diagnostics.text();
+    read(nodes, outputs);
     return pipeline;
   }
-  static std::string fault_of(const std::function<void()>& act) {
-    try {
-      act();
-    } catch (const marrow::Error& error) {
-      return error.what();
-    }
-    return "none";
-  }
-  Scratch scratch;
 };
 
 TEST_F(RunFolderTest, OfManyThatWantOneAtOnceOneGetsIt) {
@@ -70,8 +59,8 @@ TEST_F(RunFolderTest, OfManyThatWantOneAtOnceOneGetsIt) {
     std::vector<std::thread> threads;
     for (int i = 0; i < 4; ++i)
       threads.emplace_back([&] {
-        const std::string fault = fault_of([&] { RunFolder{folder, pipeline}; });
-        good += fault == "none";
+        const std::string fault = message_of([&] { RunFolder{folder, pipeline}; });
+        good += fault == "";
         refused += fault.find("was taken by another run just now; choose another with --out") != std::string::npos ||
                    fault.find("is already there and not empty") != std::string::npos;
       });
@@ -121,7 +110,7 @@ TEST_F(RunFolderTest, WhatIsThereStays) {
     const fs::path folder = scratch.path / (std::string("with ") + name);
     fs::create_directory(folder);
     std::ofstream(folder / name) << "mine";
-    EXPECT_NE(fault_of([&] {
+    EXPECT_NE(message_of([&] {
                 RunFolder{folder, pipeline};
               }).find("is already there and not empty; choose another with --out"),
               std::string::npos);
@@ -133,7 +122,7 @@ TEST_F(RunFolderTest, WhatIsThereStays) {
 TEST_F(RunFolderTest, AFileIsNoFolder) {
   const marrow::Pipeline pipeline = pipeline_of("  c: {uses: test.constant}\n", "o: c");
   std::ofstream(scratch.path / "file") << "";
-  EXPECT_NE(fault_of([&] {
+  EXPECT_NE(message_of([&] {
               RunFolder{scratch.path / "file", pipeline};
             }).find("/file is a file; choose another with --out"),
             std::string::npos);
@@ -144,10 +133,10 @@ TEST_F(RunFolderTest, AfterAFullDiskASecondTrySucceeds) {
   const fs::path folder = scratch.path / "out";
   {
     const marrow::test::FullDisk full(10);
-    EXPECT_NE(fault_of([&] { RunFolder{folder, pipeline}; }).find("cannot write"), std::string::npos);
+    EXPECT_NE(message_of([&] { RunFolder{folder, pipeline}; }).find("cannot write"), std::string::npos);
   }
   EXPECT_TRUE(fs::is_empty(folder));
-  EXPECT_EQ(fault_of([&] { RunFolder{folder, pipeline}; }), "none");
+  EXPECT_EQ(message_of([&] { RunFolder{folder, pipeline}; }), "");
 }
 
 TEST_F(RunFolderTest, FullDiskLeavesNoHalfRecordAndTheLogSaysSo) {
@@ -161,7 +150,7 @@ TEST_F(RunFolderTest, FullDiskLeavesNoHalfRecordAndTheLogSaysSo) {
     const marrow::test::FullDisk full(20);
     folder.log().write(marrow::LogLevel::info, "", std::string(100, 'x'));
     EXPECT_NE(
-        fault_of([&] { folder.write_record(pipeline, result, {}, test_catalogue(), {}, {}); }).find("cannot write"),
+        message_of([&] { folder.write_record(pipeline, result, {}, test_catalogue(), {}, {}); }).find("cannot write"),
         std::string::npos);
   }
   EXPECT_NE(folder.log().fault().find("lines are missing in " + (folder.path() / "log.txt").string()),

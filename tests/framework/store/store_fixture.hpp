@@ -6,7 +6,7 @@
 
 #include "marrow/runtime/store/store.hpp"
 #include "marrow/runtime/store/store_folder.hpp"
-#include "tests/framework/fixture.hpp"
+#include "tests/framework/run_fixture.hpp"
 
 namespace store_fixture {
 
@@ -62,18 +62,16 @@ pid_t claimer(const Claim& claim, const Work& work) {
   return child;
 }
 
-class StoreTest : public testing::Test {
+class StoreTest : public run_fixture::RunTest {
  protected:
   marrow::RunResult run(const std::string& nodes, const std::string& outputs, std::uint64_t seed = 1) {
-    read(nodes, outputs);
     settings.seed = seed;
-    settings.threads = 2;
     settings.store = &store;
-    settings.observer = [this](const marrow::RunEvent& event) {
+    on_event = [this](const marrow::RunEvent& event) {
       if (event.kind == marrow::RunEvent::Kind::warning || event.kind == marrow::RunEvent::Kind::failed)
         messages += event.text + "\n";
     };
-    return marrow::run_pipeline(pipeline, test_catalogue(), settings);
+    return RunTest::run(nodes, outputs);
   }
   std::vector<marrow::PlannedNode> plan(const std::string& nodes, const std::string& outputs, std::uint64_t seed = 1) {
     read(nodes, outputs);
@@ -82,25 +80,13 @@ class StoreTest : public testing::Test {
     planning.store = &store;
     return marrow::plan_pipeline(pipeline, test_catalogue(), planning);
   }
-  void read(const std::string& nodes, const std::string& outputs) {
-    marrow::Diagnostics diagnostics;
-    pipeline =
-        marrow::read_pipeline(scratch.write("p.yaml", "marrow: 1\nnodes:\n" + nodes + "outputs: {" + outputs + "}\n"),
-                              {}, test_catalogue(), diagnostics);
-    ASSERT_TRUE(diagnostics.empty()) << diagnostics.text();
-  }
-  double result_of(const marrow::RunResult& result, std::size_t index = 0) {
-    return marrow::value_of(result, pipeline.outputs[index].source).as<marrow::Metrics>().items[0].value;
-  }
+  double result_of(const marrow::RunResult& result, std::size_t index = 0) { return number(result, index); }
   static int calls(const marrow::RunResult& result) {
     int sum = 0;
     for (const auto& node : result.nodes) sum += node.calls;
     return sum;
   }
-  Scratch scratch;
   marrow::Store store{scratch.path / "store"};
-  marrow::Pipeline pipeline;
-  marrow::RunSettings settings;
   std::string messages;
 };
 

@@ -66,8 +66,8 @@ class Kinds(SharedCase):
             added = "marrow_add_plugin({0} {0}.cpp LINK opencv_imgproc FOLDER ${{CMAKE_BINARY_DIR}}/{0})\n"
             cmake += added.format(name)
         self.write("kind/CMakeLists.txt", cmake)
-        sobel = (SOURCE / "plugins" / "edges" / "sobel.cpp").read_text()
-        self.write("toolbox/mine.cpp", sobel.replace("edges.sobel", "edges.mine"))
+        masks = (SOURCE / "plugins" / "edges" / "gradient_mask.cpp").read_text()
+        self.write("toolbox/mine.cpp", masks.replace("edges.gradient_mask", "edges.mine"))
         self.write("toolbox/CMakeLists.txt", ON_TOOLBOX)
         self.write("CMakeLists.txt", ALL + "".join("add_subdirectory(%s)\n" % n for n in ("kind", "plugin", "toolbox")))
         self.build = self.scratch / "build"

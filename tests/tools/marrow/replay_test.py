@@ -258,15 +258,6 @@ class Replay(Runs):
         self.assertIsNone(self.call("a/failed/f")["inputs"])
         self.assertIn(SAME_ERROR + "inputs 'a' and 'b' do not go in step", self.replay(1, "a").stdout)
 
-    def test_a_node_that_ends_the_process(self):
-        self.plugins = [*self.plugins, BUILD / "tests" / "hostile_plugins"]
-        text = (
-            "marrow: 1\nnodes:\n  c: {uses: test.constant}\n  h: {uses: test.hostile, in: {a: c}, with: {how: exit}}\n"
-        )
-        self.run_into("a", text + "outputs: {h: h}\n", code=70)
-        self.assertIn("it ended the process", self.call("a/failed/h")["reason"])
-        self.assertIn(SAME_INPUTS, self.replay(70, "a").stdout)
-
     def test_a_cell_of_a_comparison(self):
         (self.scratch / "cases" / "one").mkdir(parents=True)
         text = LETTERS.replace("{uses: test.letters}", "{uses: test.constant, with: {value: 300, path: $case}}")

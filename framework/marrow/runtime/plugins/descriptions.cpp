@@ -19,7 +19,6 @@
 #include "marrow/runtime/plugins/manifest.hpp"
 #include "marrow/runtime/plugins/own_cache.hpp"
 #include "marrow/runtime/plugins/python_file.hpp"
-#include "marrow/runtime/plugins/searched_folders.hpp"
 #include "marrow/runtime/plugins/trust.hpp"
 
 namespace marrow {
@@ -46,9 +45,6 @@ std::string stale(const LibraryInfo& info, const Digest& digest) {
         std::uint64_t(status.st_size) != library.size)
       return fs::path(library.path).filename().string() + " has changed";
   }
-  for (const SearchedFolder& folder : info.searched)
-    if (const std::vector<fs::path> files = files_with_names(folder); !files.empty())
-      return files[0].string() + " has appeared, in a folder that is searched earlier";
   return "";
 }
 

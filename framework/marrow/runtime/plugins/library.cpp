@@ -16,7 +16,6 @@
 #include "marrow/base/number_text.hpp"
 #include "marrow/base/process_state.hpp"
 #include "marrow/base/regular_file.hpp"
-#include "marrow/base/thread_state.hpp"
 #include "marrow/plugin.hpp"
 #include "marrow/runtime/plugins/descriptions.hpp"
 #include "marrow/runtime/plugins/linked_libraries.hpp"
@@ -144,7 +143,6 @@ LibraryInfo describe_here(const fs::path& file) {
     }
     const PluginEntry& entry = checked_entry(handle);
     info.linked = linked_libraries(handle);
-    info.searched = run_path_folders(handle);
     Plugin plugin;
     run_registration(plugin, entry);
     add_registered(plugin, info);

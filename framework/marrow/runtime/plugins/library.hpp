@@ -21,16 +21,6 @@ struct LinkedLibrary {
   using fields = Fields<&LinkedLibrary::path, &LinkedLibrary::size>;
 };
 
-/// A folder in which a plugin's libraries or modules were looked for before they were found elsewhere, or not at all. A
-/// file that appears there may be loaded instead.
-struct SearchedFolder {
-  std::string path;
-  /// The names that were looked for: a file's full name, or its name up to the first dot. "*.pth" stands for all files
-  /// with this ending.
-  std::vector<std::string> names;
-  using fields = Fields<&SearchedFolder::path, &SearchedFolder::names>;
-};
-
 /// What is known about a plugin library without loading it: the content of its manifest, or why it is refused.
 struct LibraryInfo {
   std::filesystem::path file;
@@ -39,13 +29,12 @@ struct LibraryInfo {
   Digest digest;        ///< digest of the file
   Digest build_id;  ///< digest of its own file, the framework's, and the builds of the libraries that these two link
   std::vector<LinkedLibrary> linked;
-  std::vector<SearchedFolder> searched;  ///< in the order of the search
   std::vector<KindInfo> kinds;
   std::vector<NodeInfo> nodes;
   std::vector<WriterInfo> writers;
   using fields = Fields<&LibraryInfo::file, &LibraryInfo::refused, &LibraryInfo::note, &LibraryInfo::digest,
-                        &LibraryInfo::build_id, &LibraryInfo::linked, &LibraryInfo::searched, &LibraryInfo::kinds,
-                        &LibraryInfo::nodes, &LibraryInfo::writers>;
+                        &LibraryInfo::build_id, &LibraryInfo::linked, &LibraryInfo::kinds, &LibraryInfo::nodes,
+                        &LibraryInfo::writers>;
 };
 
 /// Loads a plugin library into this process and registers its kinds and nodes. It is never unloaded. Throws Error with

@@ -110,7 +110,6 @@ std::optional<IndexedLibrary> LibraryIndex::indexed(const LibraryInfo& info) con
   if (!info.refused.empty() || is_python_plugin(info.file)) return std::nullopt;
   const fs::path manifest = manifest_beside(info.file);
   std::vector<fs::path> files = paths_of(info.linked), optional{manifest};
-  for (const SearchedFolder& folder : info.searched) optional.emplace_back(folder.path);
   TrustedFiles trusted;
   for (const fs::path& file : files)
     if (!is_of_the_system(file.string()) && !trusted.add(file)) return std::nullopt;

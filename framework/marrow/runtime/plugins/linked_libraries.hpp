@@ -15,11 +15,6 @@ std::vector<LinkedLibrary> linked_libraries(void* handle);
 /// running their code. Empty if it lists none, for example because one of them is missing.
 std::vector<std::filesystem::path> libraries_to_load(const std::filesystem::path& library);
 
-/// The folders of run paths (DT_RUNPATH, DT_RPATH) in which the loader looked in vain for what a loaded library needs,
-/// directly or indirectly, each with the names of these libraries. Leaves out folders in LD_LIBRARY_PATH, and libraries
-/// that the framework needs: they were loaded before.
-std::vector<SearchedFolder> run_path_folders(void* handle);
-
 /// The libraries that the framework needs in this process, directly or indirectly.
 const std::vector<LinkedLibrary>& framework_libraries();
 

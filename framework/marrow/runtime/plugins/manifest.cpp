@@ -18,7 +18,7 @@ namespace marrow {
 namespace {
 
 using nlohmann::json;
-constexpr int kManifestVersion = 6;  // 6: the checksum is of the text that follows it
+constexpr int kManifestVersion = 7;  // 7: without folders in which libraries were looked for
 constexpr std::string_view kChecksum = "{\"checksum\": \"";
 constexpr std::size_t kDigits = 32;  // of a checksum
 constexpr std::int64_t kMostBytes_of_value = 1 << 30;
@@ -228,11 +228,6 @@ LinkedLibrary linked_from(const json& j) {
   return {full_path_from(fields.at("path"), "a library"), std::uint64_t(fields.integer("size", 0, INT64_MAX))};
 }
 
-SearchedFolder searched_from(const json& j) {
-  const JsonObject fields(j, "a searched folder", 2);
-  return {full_path_from(fields.at("path"), "a folder"), fields.texts("names")};
-}
-
 json parsed(const std::string& text) {
   if (text.size() > kMostManifest_bytes) damaged(formatted("it has {} bytes", text.size()));
   try {
@@ -260,11 +255,9 @@ json json_of(const NodeInfo& node) { return document_of(node); }
 
 json library_json(const LibraryInfo& info) {
   json j = {{"marrow_manifest", kManifestVersion}, {"library", info.digest.hex()}, {"refused", info.refused}};
-  j["linked"] = j["searched"] = json::array();
+  j["linked"] = json::array();
   for (const LinkedLibrary& library : info.linked)
     j["linked"].push_back({{"path", json_of_bytes(library.path)}, {"size", library.size}});
-  for (const SearchedFolder& folder : info.searched)
-    j["searched"].push_back({{"path", json_of_bytes(folder.path)}, {"names", folder.names}});
   j["kinds"] = document_of(info.kinds);
   j["nodes"] = document_of(info.nodes);
   j["writers"] = document_of(info.writers);
@@ -286,7 +279,7 @@ LibraryInfo manifest_from_text(const std::string& text) {
 }
 
 LibraryInfo library_from_json(const json& j) {
-  const JsonObject fields(j, "it", 8);
+  const JsonObject fields(j, "it", 7);
   LibraryInfo info;
   const std::optional<Digest> digest = digest_of_hex(fields.text("library"));
   if (!digest) damaged("the library's digest is not 32 hexadecimal digits");
@@ -295,7 +288,6 @@ LibraryInfo library_from_json(const json& j) {
   if (fields.list("linked").size() > kMostLinked)
     damaged(formatted("it names more than {} linked libraries", kMostLinked));
   for (const json& library : fields.list("linked")) info.linked.push_back(linked_from(library));
-  for (const json& folder : fields.list("searched")) info.searched.push_back(searched_from(folder));
   std::set<std::string> kinds, names;
   for (const json& kind : fields.list("kinds")) {
     info.kinds.push_back(read_from<KindInfo>(kind));

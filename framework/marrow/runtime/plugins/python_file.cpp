@@ -15,7 +15,6 @@
 #include "marrow/runtime/plugins/linked_libraries.hpp"
 #include "marrow/runtime/plugins/manifest.hpp"
 #include "marrow/runtime/plugins/python_process.hpp"
-#include "marrow/runtime/plugins/searched_folders.hpp"
 #include "marrow/runtime/plugins/trust.hpp"
 #include "marrow/runtime/process/packed_values.hpp"
 
@@ -29,13 +28,6 @@ constexpr std::size_t kMostSource_bytes = 4 << 20;
 constexpr int kTries = 5;
 
 LinkedLibrary with_size(const std::string& file) { return {file, fs::file_size(file)}; }
-
-std::vector<SearchedFolder> searched_in(const json& answer) {
-  std::vector<SearchedFolder> searched;
-  for (const json& one : answer.at("searched"))
-    searched.push_back({bytes_of_json(one.at("path")), one.at("names").get<std::vector<std::string>>()});
-  return searched;
-}
 
 /// Whether a file was changed after the time, or so shortly before it that its time does not tell.
 bool is_newer(const std::string& file, const timespec& time) {
@@ -66,7 +58,6 @@ LibraryInfo described_by_process(const fs::path& real, std::vector<std::string>&
   try {
     for (const json& one : end.answer.at("files")) files.push_back(bytes_of_json(one));
     info = info_of_nodes(end.answer.at("nodes"));
-    info.searched = searched_in(end.answer);
   } catch (const std::exception& error) {
     info.refused = std::string("describes itself in a way that cannot be used: ") + error.what();
   }
@@ -120,7 +111,6 @@ Digest digest_of_python(const LibraryInfo& described) {
     digest.add(one.path);
     digest.add(identity_of(one));
   }
-  add_state_of(described.searched, digest);
   return digest.digest();
 }
 
@@ -166,34 +156,17 @@ LibraryInfo python_file_info(const fs::path& file, const Digest& framework) {
   return info;
 }
 
-bool LoadedByPython::add_new(const json& answer, const LibraryInfo& described) {
-  std::set<std::string> known = files;
-  for (const LinkedLibrary& one : described.linked) known.insert(one.path);
-  std::map<std::string, std::set<std::string>> known_names = searched;
-  for (const SearchedFolder& one : described.searched) known_names[one.path].insert(one.names.begin(), one.names.end());
-  bool is_new = false;
-  for (const json& one : answer.at("files"))
-    if (const std::string file = bytes_of_json(one); !known.contains(file))
-      is_new = files.insert(file).second || is_new;
-  for (const SearchedFolder& one : searched_in(answer))
-    for (const std::string& name : one.names)
-      if (!known_names[one.path].contains(name)) is_new = searched[one.path].insert(name).second || is_new;
-  return is_new;
-}
-
-void add_to_description(const LibraryInfo& described, const LoadedByPython& more_loaded) {
+void add_to_description(const LibraryInfo& described, const json& answer, std::set<std::string>& more_loaded) {
+  const std::size_t before = more_loaded.size();
+  for (const json& one : answer.at("files")) more_loaded.insert(bytes_of_json(one));
+  for (const LinkedLibrary& one : described.linked) more_loaded.erase(one.path);
+  if (more_loaded.size() == before) return;
   {
     const std::scoped_lock lock(incomplete().mutex);
     incomplete().descriptions.emplace(described.file, described.digest);
   }
   LibraryInfo more = described;
-  for (const std::string& file : more_loaded.files) more.linked.push_back(with_size(file));
-  for (const auto& [path, names] : more_loaded.searched) {
-    auto folder = std::find_if(more.searched.begin(), more.searched.end(),
-                               [&path = path](const auto& one) { return one.path == path; });
-    if (folder == more.searched.end()) folder = more.searched.insert(more.searched.end(), SearchedFolder{path, {}});
-    folder->names.insert(folder->names.end(), names.begin(), names.end());
-  }
+  for (const std::string& file : more_loaded) more.linked.push_back(with_size(file));
   more.digest = digest_of_python(more);
   keep_description(more, name_in_cache(trusted_path(described.file)), file_digest(framework_file()));
 }

@@ -53,7 +53,7 @@ class PythonNodes {
   LibraryInfo described_;
   std::mutex mutex_;
   std::vector<std::unique_ptr<PythonProcess>> idle_;
-  LoadedByPython undescribed_;
+  std::set<std::string> undescribed_;  ///< files that were loaded, and that the description does not name
 };
 
 }  // namespace marrow

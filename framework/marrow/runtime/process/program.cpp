@@ -18,7 +18,6 @@
 #include "marrow/base/no_process.hpp"
 #include "marrow/base/number_text.hpp"
 #include "marrow/base/printable.hpp"
-#include "marrow/base/process_state.hpp"
 #include "marrow/base/process_tree.hpp"
 #include "marrow/base/stopwatch.hpp"
 #include "spawn.hpp"
@@ -63,13 +62,9 @@ class Child {
     posix_spawn_file_actions_adddup2(&actions, output, STDERR_FILENO);
     posix_spawn_file_actions_addchdir_np(&actions, call.folder.c_str());
     const SpawnAttributes attributes;
-    int fault = 0;
-    ProcessState::of_runs()->keep_for_process([&] {
-      end();
-      fault =
-          posix_spawn(&process_, program.c_str(), &actions, attributes.get(), words_of(call.command).data(), environ);
-      if (fault) process_ = -1;
-    });
+    const int fault =
+        posix_spawn(&process_, program.c_str(), &actions, attributes.get(), words_of(call.command).data(), environ);
+    if (fault) process_ = -1;
     posix_spawn_file_actions_destroy(&actions);
     if (fault == EAGAIN || fault == ENOMEM)
       throw NoProcess(std::string("cannot start a process: ") + std::strerror(fault));

@@ -21,7 +21,6 @@
 #include "marrow/base/json_text.hpp"
 #include "marrow/base/no_process.hpp"
 #include "marrow/base/number_text.hpp"
-#include "marrow/base/process_state.hpp"
 #include "marrow/base/process_tree.hpp"
 #include "marrow/base/stopwatch.hpp"
 #include "spawn.hpp"
@@ -112,10 +111,7 @@ int status_of_ended(pid_t process) {
 
 Worker::Worker(const WorkerSettings& settings) {
   auto input = make_pipe(), output = make_pipe();
-  ProcessState::of_runs()->keep_for_process([&] {
-    close();  // an earlier one, which inherited what a node had changed
-    process_ = start(settings, input.read_end, output.write_end);
-  });
+  process_ = start(settings, input.read_end, output.write_end);
   to_ = std::move(input.write_end);
   from_ = std::move(output.read_end);
   fcntl(from_, F_SETFL, O_NONBLOCK);

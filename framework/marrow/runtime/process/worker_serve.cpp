@@ -17,7 +17,6 @@
 #include "marrow/base/number_text.hpp"
 #include "marrow/base/process_tree.hpp"
 #include "marrow/base/reason_of_exception.hpp"
-#include "marrow/runtime/process/plugin_code.hpp"
 #include "marrow/runtime/process/worker.hpp"
 
 namespace marrow {
@@ -79,7 +78,7 @@ class Answers : public WorkerReports {
       if (message.contains(key)) shorten(message[key]);
     const std::string line = message.dump(-1, ' ', false, json::error_handler_t::replace) + "\n";
     const std::scoped_lock lock(mutex_);
-    if (!write_all(descriptor_, line)) end_process(1);  // nobody reads the answers any more
+    if (!write_all(descriptor_, line)) _exit(1);  // nobody reads the answers any more
   }
 
  private:
@@ -119,7 +118,6 @@ json result_of(const WorkerTask& task, const json& request, Answers& answers) {
 
 int serve_worker(const std::map<std::string, WorkerTask>& tasks) {
   prctl(PR_SET_PDEATHSIG, SIGKILL);
-  leave_ends_to_parent();
   keep_descendants();
   for (int descriptor = STDERR_FILENO + 1; descriptor < kFirstOwnDescriptor; ++descriptor)
     fcntl(descriptor, F_SETFD, FD_CLOEXEC);  // what the worker is given is not for what it starts

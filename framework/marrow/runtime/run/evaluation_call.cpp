@@ -12,7 +12,6 @@
 #include "marrow/base/stopwatch.hpp"
 #include "marrow/runtime/pipeline/named_files.hpp"
 #include "marrow/runtime/plugins/python_file.hpp"
-#include "marrow/runtime/process/plugin_code.hpp"
 #include "marrow/runtime/run/apart.hpp"
 #include "marrow/runtime/run/evaluation.hpp"
 #include "marrow/runtime/run/keys.hpp"
@@ -150,19 +149,13 @@ std::vector<Value> Evaluation::call_node(std::size_t node, std::vector<Value>& i
   if (!apart || !inputs.empty()) make_inputs(catalogue_.load(called.info.name), inputs);
   report(RunEvent::Kind::started, node, item, "");
   if (replay && replay->on_begin) replay->on_begin(called, inputs);
-  const std::uint64_t seed = seed_of_call(node, item, recipe);
-  const Context::Hooks hooks = make_hooks(node, item, seed, warnings);
+  const Context::Hooks hooks = make_hooks(node, item, seed_of_call(node, item, recipe), warnings);
   if (apart) return call_apart(catalogue_, called, inputs, hooks, settings_);
-  const PluginCode code("node '" + called.id + "' (" + called.info.name + ")", [&](const std::string& reason) {
-    note_failure(node, item, reason, seed, inputs);
-    report(RunEvent::Kind::failed, node, item, failure_text(node, item, reason), 0, 0, LogLevel::error);
-  });
   const NodeDefinition& definition = catalogue_.load(called.info.name);
   const std::shared_ptr<void> options = definition.make_options();
   for (std::size_t i = 0; i < called.options.size(); ++i) definition.set_option[i](options.get(), called.options[i]);
   std::vector<Value> outputs;
   state_->keep_during([&] {
-    warnings.clear();
     Context context(hooks);
     if (replay && replay->stops_before) std::raise(SIGTRAP);  // the next step enters the node
     outputs = definition.call(inputs, options.get(), context);

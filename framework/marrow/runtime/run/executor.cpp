@@ -6,11 +6,11 @@
 #include <oneapi/tbb/task_arena.h>
 
 #include <algorithm>
+#include <opencv2/core.hpp>
 #include <thread>
 
 #include "marrow/base/no_process.hpp"
 #include "marrow/base/process_state.hpp"
-#include "marrow/base/thread_state.hpp"
 #include "marrow/base/thread_supply.hpp"
 #include "marrow/runtime/run/graph_run.hpp"
 
@@ -25,8 +25,8 @@ RunResult run_pipeline(const Pipeline& pipeline, const Catalogue& catalogue, con
   const UsualArithmetic arithmetic;  // the threads of the pool take it over
   GraphRun run(pipeline, catalogue, settings);
   // The pool is the only source of threads. OpenCV's own loops stay on the thread of the node that calls them.
-  const std::shared_ptr<ProcessState> state = ProcessState::of_runs();
-  state->set_up_opencv();
+  cv::setNumThreads(1);
+  cv::setUseOptimized(true);
   const int wanted = settings.threads > 0 ? settings.threads : int(std::max(1u, std::thread::hardware_concurrency()));
   const int threads = threads_to_be_had(wanted);
   if (threads == 0) {

@@ -258,12 +258,12 @@ std::string PythonNodes::changed() const {
   return described_.file.string() + " or a module that it imports was changed since this program began; start it again";
 }
 
-/// Notes the files that a process has loaded or looked for, if the description does not name them.
+/// Notes the files that a process has loaded, if the description does not name them.
 void PythonNodes::learn(const json& answer) {
   if (answer.at("files").empty()) return;  // nothing since its last answer
   const std::scoped_lock lock(mutex_);
   if (digest_of_python(described_) != described_.digest) throw Error(changed());
-  if (undescribed_.add_new(answer, described_)) add_to_description(described_, undescribed_);
+  add_to_description(described_, answer, undescribed_);
 }
 
 std::unique_ptr<Plugin> load_python_file(const LibraryInfo& described) {

@@ -2,10 +2,8 @@
 #include "marrow/runtime/run/written_values.hpp"
 
 #include "marrow/base/file_names.hpp"
-#include "marrow/base/printable.hpp"
 #include "marrow/base/process_state.hpp"
 #include "marrow/base/reason_of_exception.hpp"
-#include "marrow/runtime/process/plugin_code.hpp"
 
 namespace marrow {
 
@@ -39,7 +37,6 @@ void write_value(const Value& value, const fs::path& stem, const fs::path& root,
   try {
     fs::create_directories(file.parent_path());  // so a list of which no item was made has no folder
     const WriterDefinition& definition = catalogue.load_writer(value.type);
-    const PluginCode code("the writer of " + printable(file.string()));
     ProcessState::of_runs()->keep_during([&] { definition.write(value.data.get(), file.string()); });
     written.files.push_back(file.lexically_relative(root).string());
   } catch (...) {

@@ -1,23 +1,21 @@
 // SPDX-License-Identifier: Apache-2.0
 // A plain check of cameras against points, five that are wrong in one way each, and a camera that is none: the suite
 // must catch each.
-#include <atomic>
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
-#include <marrow/plugin.hpp>
+
+#include "wrong.hpp"
 
 namespace {
-
-enum class Fault { none, silent, anxious, careless, changing, trusting };
 
 struct Options {
   std::filesystem::path points = "";
 };
 
 /// The largest distance, in px, between where a view should show a point and where it is; infinite behind the source.
-double worst_px(const marrow::View& view, const std::filesystem::path& file, bool second, Fault fault) {
+double worst_px(const marrow::View& view, const std::filesystem::path& file, bool second, wrong::Fault fault) {
   std::ifstream stream(file);
   double worst = 0;
   for (std::string line; std::getline(stream, line);) {
@@ -27,25 +25,24 @@ double worst_px(const marrow::View& view, const std::filesystem::path& file, boo
                     &at[1], &at[2], &seen[0][0], &seen[0][1], &seen[1][0], &seen[1][1]) != 7)
       continue;
     const double off = (marrow::project(view.camera, at) - seen[second]).norm();
-    worst = std::max(worst, std::isfinite(off) || fault == Fault::trusting ? off : INFINITY);
+    worst = std::max(worst, std::isfinite(off) || fault == "trusting" ? off : INFINITY);
   }
   return worst;
 }
 
-template <Fault fault>
+template <wrong::Fault fault>
 marrow::Metrics check(const marrow::List<marrow::View>& views, const Options& options) {
-  static std::atomic<int> calls{0};
   double error = 0, warnings = 0;
   for (std::size_t i = 0; i < views.size(); ++i) {
-    if (fault != Fault::careless) marrow::check_camera(views[i].camera, "view " + views[i].name);
+    if (!(fault == "careless")) marrow::check_camera(views[i].camera, "view " + views[i].name);
     const double worst = worst_px(views[i], options.points, i == 1, fault);
     warnings += worst > 2;
     error += worst;
   }
-  if (fault == Fault::careless && !std::isfinite(error)) error = NAN;
-  if (fault == Fault::silent) warnings = 0;
-  if (fault == Fault::anxious) ++warnings;
-  if (fault == Fault::changing) error += ++calls;
+  if (fault == "careless" && !std::isfinite(error)) error = NAN;
+  if (fault == "silent") warnings = 0;
+  if (fault == "anxious") ++warnings;
+  if (fault == "changing") error += wrong::next_call();
   return {{{"warnings", warnings, ""}, {"error", error, "px"}}};
 }
 
@@ -56,21 +53,19 @@ marrow::Camera left_handed() {
   return camera;
 }
 
+template <wrong::Fault... faults>
+void declare(marrow::Plugin& plugin) {
+  (plugin.node(std::string("camera.") + faults.name, check<faults>)
+       .summary("For a test of the suite")
+       .in("views", "images with the cameras to check", marrow::over("view"))
+       .out("metrics", "figures")
+       .option("points", &Options::points, "points and where they are seen"),
+   ...);
+}
+
 }  // namespace
 
 MARROW_PLUGIN(plugin) {
-  const auto add = [&](const char* name, auto* function) {
-    plugin.node(name, function)
-        .summary("For a test of the suite")
-        .in("views", "images with the cameras to check", marrow::over("view"))
-        .out("metrics", "figures")
-        .option("points", &Options::points, "points and where they are seen");
-  };
-  add("camera.plain", check<Fault::none>);
-  add("camera.silent", check<Fault::silent>);
-  add("camera.anxious", check<Fault::anxious>);
-  add("camera.careless", check<Fault::careless>);
-  add("camera.changing", check<Fault::changing>);
-  add("camera.trusting", check<Fault::trusting>);
+  declare<"plain", "silent", "anxious", "careless", "changing", "trusting">(plugin);
   plugin.node("camera.left_handed", left_handed).summary("For a test of the suite").out("camera", "geometry");
 }

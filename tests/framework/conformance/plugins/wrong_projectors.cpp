@@ -1,178 +1,115 @@
 // SPDX-License-Identifier: Apache-2.0
-// Two plain projectors, one that adds a volume's attenuation at even steps and one that draws the edges of a mesh
-// between what faces the source and what does not, and others that are wrong in one way each: the suite must catch each
-// of them.
-#include <atomic>
-#include <cmath>
-#include <map>
-#include <marrow/plugin.hpp>
+#include "wrong.hpp"
 
 namespace {
 
-enum class Fault { none, shifted, dense, narrow, behind, silent, coarse, everything, changing, inward, gaps, slanted };
+using marrow::Camera;
+using marrow::OutlinePoint;
+using marrow::OutlineProjector;
+using marrow::PixelGrid;
+using marrow::RadiographProjector;
+using marrow::RigidTransform;
 
-template <Fault fault>
-class PlainOutline : public marrow::OutlineProjector {
+template <wrong::Fault fault>
+class Outline : public OutlineProjector {
  public:
-  explicit PlainOutline(const marrow::Mesh& mesh) : mesh_(mesh) { marrow::check_mesh(mesh, "the mesh"); }
-
-  std::vector<marrow::OutlinePoint> outline(const marrow::Camera& camera, const marrow::RigidTransform& pose,
-                                            double spacing_px) const override {
-    if constexpr (fault == Fault::silent) throw marrow::Error("no");
-    const marrow::RigidTransform camera_from_model = camera.camera_from_world * pose;
-    const Eigen::Vector3d source = inverse(camera_from_model).translation_mm;
-    const auto normal_of = [&](std::size_t t) {
-      const auto& [a, b, c] = mesh_.triangles[t];
-      return Eigen::Vector3d((mesh_.vertices_mm[b] - mesh_.vertices_mm[a])
-                                 .cross(mesh_.vertices_mm[c] - mesh_.vertices_mm[a])
-                                 .normalized());
-    };
-    std::map<std::pair<std::uint32_t, std::uint32_t>, std::pair<bool, Eigen::Vector3d>> open;
-    std::vector<marrow::OutlinePoint> points;
-    double passed = 0;
-    for (std::size_t t = 0; t < mesh_.triangles.size(); ++t) {
-      const Eigen::Vector3d normal = normal_of(t);
-      const bool front = normal.dot(source - mesh_.vertices_mm[mesh_.triangles[t][0]]) > 0;
-      for (std::size_t k = 0; k < 3; ++k) {
-        const auto a = mesh_.triangles[t][k], b = mesh_.triangles[t][(k + 1) % 3];
-        const auto [at, added] = open.try_emplace({std::min(a, b), std::max(a, b)}, front, normal);
-        if (added || at->second.first == front) continue;
-        passed += add(camera, pose, camera_from_model, a, b, normal + at->second.second, spacing_px, passed, points);
-        passed = std::fmod(passed, spacing_px);
-      }
+  explicit Outline(std::shared_ptr<const OutlineProjector> right) : right_(std::move(right)) {}
+  std::vector<OutlinePoint> outline(const Camera& camera, const RigidTransform& pose,
+                                    double spacing_px) const override {
+    if (fault == "silent") throw marrow::Error("no");
+    std::vector<OutlinePoint> points = right_->outline(camera, pose, spacing_px);
+    if (fault == "gaps") std::erase_if(points, [](const OutlinePoint& point) { return point.u_px < 70; });
+    for (OutlinePoint& point : points) {
+      const float u = point.normal_u, v = point.normal_v;
+      if (fault == "inward") point.normal_u = -u, point.normal_v = -v;
+      if (fault == "slanted") point.normal_u = 0.9f * u - 0.436f * v, point.normal_v = 0.436f * u + 0.9f * v;
+      if (fault == "shifted_outline") point.u_px = std::min(point.u_px + 1.5f, float(camera.width_px - 1));
     }
     return points;
   }
 
  private:
-  /// One point for each spacing_px of outline; gives the length of this piece.
-  double add(const marrow::Camera& camera, const marrow::RigidTransform& pose,
-             const marrow::RigidTransform& camera_from_model, std::uint32_t a, std::uint32_t b,
-             const Eigen::Vector3d& normal, double spacing_px, double passed,
-             std::vector<marrow::OutlinePoint>& points) const {
-    const Eigen::Vector3d middle = 0.5 * (mesh_.vertices_mm[a] + mesh_.vertices_mm[b]);
-    const Eigen::Vector2d from = project(camera, pose * mesh_.vertices_mm[a]),
-                          to = project(camera, pose * mesh_.vertices_mm[b]), pixel = 0.5 * (from + to);
-    if (!pixel.allFinite()) return 0;
-    const bool is_out =
-        pixel.x() < 0 || pixel.y() < 0 || pixel.x() > camera.width_px - 1 || pixel.y() > camera.height_px - 1;
-    const double length = (to - from).norm();
-    if (is_out || passed + length < spacing_px || (fault == Fault::gaps && pixel.x() < 70)) return is_out ? 0 : length;
-    Eigen::Vector2d n =
-        (camera.intrinsics.inverse().transpose() * (camera_from_model.rotation * normal)).head<2>().normalized();
-    if (fault == Fault::inward) n = -n;
-    if (fault == Fault::slanted) n = Eigen::Vector2d(0.9 * n.x() - 0.436 * n.y(), 0.436 * n.x() + 0.9 * n.y());
-    const double off = fault == Fault::shifted ? 1.5 : 0;
-    points.push_back({float(std::min(pixel.x() + off, camera.width_px - 1.0)), float(pixel.y()), float(n.x()),
-                      float(n.y()), middle.cast<float>()});
-    return length;
-  }
-
-  const marrow::Mesh& mesh_;
+  std::shared_ptr<const OutlineProjector> right_;
 };
 
-template <Fault fault>
-class PlainRadiograph : public marrow::RadiographProjector {
+template <wrong::Fault fault>
+class Radiograph : public RadiographProjector {
  public:
-  PlainRadiograph(const marrow::Volume& volume, const marrow::SignedField* field)
-      : volume_(volume), field_(fault == Fault::everything ? nullptr : field) {
-    marrow::check_volume(volume, "the volume");
-    if (field && (field->grid.size != volume.grid.size || field->values_mm.size() != volume.values.size()))
-      throw marrow::Error("the field has another size than the volume");
+  explicit Radiograph(std::shared_ptr<const RadiographProjector> right) : right_(std::move(right)) {}
+  std::vector<float> radiograph(const Camera& camera, const RigidTransform& pose,
+                                const PixelGrid& grid) const override {
+    PixelGrid read = grid;
+    if (fault == "coarse") read.step_px = 1;
+    if (fault == "shifted_radiograph") read.u_px += 1.5;
+    return changed(camera, pose, read);
   }
-
-  std::vector<float> radiograph(const marrow::Camera& camera, const marrow::RigidTransform& pose,
-                                const marrow::PixelGrid& grid) const override {
-    std::vector<float> values;
-    const double step = fault == Fault::coarse ? 1 : grid.step_px;
-    for (int row = 0; row < grid.rows; ++row)
-      for (int column = 0; column < grid.columns; ++column)
-        values.push_back(integral(camera, pose, grid.u_px + step * column, grid.v_px + step * row));
-    return values;
-  }
-  std::vector<float> radiograph(const marrow::Camera& camera, const marrow::RigidTransform& pose,
+  std::vector<float> radiograph(const Camera& camera, const RigidTransform& pose,
                                 const std::vector<Eigen::Vector2f>& pixels) const override {
-    std::vector<float> values;
-    for (const auto& p : pixels) values.push_back(integral(camera, pose, double(p.x()), double(p.y())));
-    return values;
+    std::vector<Eigen::Vector2f> read = pixels;
+    if (fault == "shifted_radiograph")
+      for (Eigen::Vector2f& pixel : read) pixel.x() += 1.5f;
+    return changed(camera, pose, read);
   }
-  marrow::PixelGrid region(const marrow::Camera& camera, const marrow::RigidTransform&) const override {
-    marrow::check_camera(camera, "the camera");
-    if (fault == Fault::narrow) return {60, 60, 1, 40, 40};
-    return {0, 0, 1, camera.width_px, camera.height_px};
+  PixelGrid region(const Camera& camera, const RigidTransform& pose) const override {
+    return fault == "narrow" ? PixelGrid{60, 60, 1, 40, 40} : right_->region(camera, pose);
   }
 
  private:
-  float integral(const marrow::Camera& camera, const marrow::RigidTransform& pose, double u, double v) const {
-    static std::atomic<int> calls{0};
-    constexpr double kStep_mm = 0.8, kReach_mm = 48;
-    marrow::check_camera(camera, "the camera");
-    const marrow::RigidTransform model_from_world = inverse(pose);
-    const Eigen::Vector3d source = model_from_world * source_position_mm(camera),
-                          middle = volume_.grid.point_from_index(
-                              0.5 * Eigen::Vector3d(volume_.grid.size[0], volume_.grid.size[1], volume_.grid.size[2]));
-    const Eigen::Vector3d along =
-        model_from_world.rotation * ray_direction(camera, {u + (fault == Fault::shifted ? 1.5 : 0), v});
-    const double nearest = (middle - source).dot(along);
-    double sum = 0;
-    for (double t = nearest - kReach_mm; t < nearest + kReach_mm; t += kStep_mm) {
-      if (t < 0 && fault != Fault::behind) continue;
-      const Eigen::Vector3d index = volume_.grid.index_from_point(source + t * along);
-      bool is_in = true;
-      for (int k = 0; k < 3; ++k)
-        is_in = is_in && index[k] >= -0.5 && index[k] <= volume_.grid.size[std::size_t(k)] - 0.5;
-      if (!is_in || (field_ && sample_trilinear(field_->grid, field_->values_mm, index) > 1)) continue;
-      sum += kStep_mm * (double(sample_trilinear(volume_.grid, volume_.values, index)) + 1000) / 1000;
+  template <class Pixels>
+  std::vector<float> changed(const Camera& camera, const RigidTransform& pose, const Pixels& pixels) const {
+    std::vector<float> values = right_->radiograph(camera, pose, pixels);
+    if (fault == "dense")
+      for (float& value : values) value *= 1.05f;
+    if (fault == "changing" && !values.empty()) values[values.size() / 2] *= 1 + 0.001f * float(wrong::next_call());
+    if (fault == "behind") {  // what lies behind the source, mirrored
+      Camera back = camera;
+      back.camera_from_world.rotation.bottomRows<2>() *= -1;
+      back.camera_from_world.translation_mm.tail<2>() *= -1;
+      const std::vector<float> more = right_->radiograph(back, pose, pixels);
+      for (std::size_t i = 0; i < values.size(); ++i) values[i] += more[i];
     }
-    if (fault == Fault::dense) sum *= 1.05;
-    if (fault == Fault::changing && ++calls % 7 == 0) sum *= 1.001;
-    return float(std::max(0.0, sum));
+    return values;
   }
 
-  const marrow::Volume& volume_;
-  const marrow::SignedField* field_;
+  std::shared_ptr<const RadiographProjector> right_;
 };
 
-template <Fault fault>
-std::shared_ptr<const marrow::OutlineProjector> outline(const marrow::Mesh& mesh) {
-  return std::make_shared<PlainOutline<fault>>(mesh);
+template <wrong::Fault fault>
+std::shared_ptr<const OutlineProjector> outline(const marrow::Mesh& mesh) {
+  return std::make_shared<Outline<fault>>(wrong::right_function<OutlineProjector>(
+      "project.silhouette_edges", "projector", {{"model", marrow::node_test::item(mesh)}}));
 }
 
-template <Fault fault>
-std::shared_ptr<const marrow::RadiographProjector> radiograph(const marrow::Volume& volume,
-                                                              const marrow::SignedField* field) {
-  return std::make_shared<PlainRadiograph<fault>>(volume, field);
+template <wrong::Fault fault>
+std::shared_ptr<const RadiographProjector> radiograph(const marrow::Volume& volume, const marrow::SignedField* field) {
+  marrow::node_test::Inputs inputs{{"volume", marrow::node_test::item(volume)}};
+  if (field && !(fault == "everything")) inputs["field"] = marrow::node_test::item(*field);
+  return std::make_shared<Radiograph<fault>>(
+      wrong::right_function<RadiographProjector>("project.siddon_jacobs", "projector", inputs));
+}
+
+template <wrong::Fault... faults>
+void declare_outlines(marrow::Plugin& plugin) {
+  (plugin.node(std::string("project.") + faults.name, outline<faults>)
+       .summary("For a test of the suite")
+       .in("model", "surface")
+       .out("projector", "draws the outline"),
+   ...);
+}
+template <wrong::Fault... faults>
+void declare_radiographs(marrow::Plugin& plugin) {
+  (plugin.node(std::string("project.") + faults.name, radiograph<faults>)
+       .summary("For a test of the suite")
+       .in("volume", "CT")
+       .in("field", "fragment")
+       .out("projector", "makes radiographs"),
+   ...);
 }
 
 }  // namespace
 
 MARROW_PLUGIN(plugin) {
-  const auto add_outline = [&](const char* name, auto* function) {
-    plugin.node(name, function)
-        .summary("For a test of the suite")
-        .in("model", "surface")
-        .out("projector", "draws the outline");
-  };
-  add_outline("project.plain_outline", outline<Fault::none>);
-  add_outline("project.shifted_outline", outline<Fault::shifted>);
-  add_outline("project.silent", outline<Fault::silent>);
-  add_outline("project.inward", outline<Fault::inward>);
-  add_outline("project.gaps", outline<Fault::gaps>);
-  add_outline("project.slanted", outline<Fault::slanted>);
-
-  const auto add_radiograph = [&](const char* name, auto* function) {
-    plugin.node(name, function)
-        .summary("For a test of the suite")
-        .in("volume", "CT")
-        .in("field", "fragment")
-        .out("projector", "makes radiographs");
-  };
-  add_radiograph("project.plain_radiograph", radiograph<Fault::none>);
-  add_radiograph("project.shifted_radiograph", radiograph<Fault::shifted>);
-  add_radiograph("project.dense", radiograph<Fault::dense>);
-  add_radiograph("project.narrow", radiograph<Fault::narrow>);
-  add_radiograph("project.behind", radiograph<Fault::behind>);
-  add_radiograph("project.coarse", radiograph<Fault::coarse>);
-  add_radiograph("project.everything", radiograph<Fault::everything>);
-  add_radiograph("project.changing", radiograph<Fault::changing>);
+  declare_outlines<"plain_outline", "shifted_outline", "silent", "inward", "gaps", "slanted">(plugin);
+  declare_radiographs<"plain_radiograph", "shifted_radiograph", "dense", "narrow", "behind", "coarse", "everything",
+                      "changing">(plugin);
 }

@@ -3,14 +3,13 @@
 #include <algorithm>
 #include <filesystem>
 #include <fstream>
-#include <marrow/plugin.hpp>
 #include <sstream>
 #include <string>
 #include <vector>
 
-namespace {
+#include "wrong.hpp"
 
-enum class Fault { none, takes_anything, nameless, shifted };
+namespace {
 
 struct Options {
   std::filesystem::path path;
@@ -29,7 +28,7 @@ std::vector<double> numbers_in(std::string text) {
   return numbers;
 }
 
-template <Fault kFault>
+template <wrong::Fault fault>
 marrow::Pose pose(const Options& options) {
   std::string text;
   if (std::filesystem::is_regular_file(options.path)) {
@@ -39,31 +38,27 @@ marrow::Pose pose(const Options& options) {
   const std::vector<double> numbers = numbers_in(text);
   marrow::Pose found;
   if (numbers.size() != 16) {
-    if (kFault == Fault::takes_anything) return found;
-    throw marrow::Error((kFault == Fault::nameless ? "the file" : options.path.string()) + " holds no pose of marrow");
+    if (fault == "taking_anything") return found;
+    throw marrow::Error((fault == "nameless" ? "the file" : options.path.string()) + " holds no pose of marrow");
   }
   for (int row = 0; row < 3; ++row) {
     for (int column = 0; column < 3; ++column)
       found.world_from_model.rotation(row, column) = numbers[std::size_t(4 * row + column)];
     found.world_from_model.translation_mm[row] = numbers[std::size_t(4 * row + 3)];
   }
-  if (kFault == Fault::shifted) found.world_from_model.translation_mm.x() += 0.01;
+  if (fault == "shifted") found.world_from_model.translation_mm.x() += 0.01;
   return found;
 }
 
-template <Fault kFault>
-void declare(marrow::Plugin& plugin, const char* name) {
-  plugin.node(name, pose<kFault>)
-      .summary("a pose from a file of marrow's")
-      .out("pose", "the pose")
-      .option("path", &Options::path, "the file", marrow::required());
+template <wrong::Fault... faults>
+void declare(marrow::Plugin& plugin) {
+  (plugin.node(std::string("read.") + faults.name, pose<faults>)
+       .summary("a pose from a file of marrow's")
+       .out("pose", "the pose")
+       .option("path", &Options::path, "the file", marrow::required()),
+   ...);
 }
 
 }  // namespace
 
-MARROW_PLUGIN(plugin) {
-  declare<Fault::none>(plugin, "read.plain");
-  declare<Fault::takes_anything>(plugin, "read.taking_anything");
-  declare<Fault::nameless>(plugin, "read.nameless");
-  declare<Fault::shifted>(plugin, "read.shifted");
-}
+MARROW_PLUGIN(plugin) { declare<"plain", "taking_anything", "nameless", "shifted">(plugin); }

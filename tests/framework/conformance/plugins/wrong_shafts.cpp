@@ -7,12 +7,11 @@
 #include <cstdlib>
 
 #include "marrow/shaft/pairs.hpp"
+#include "wrong.hpp"
 
 namespace {
 
 using namespace marrow::shaft;
-
-enum class Fault { none, inner, turned, swapped, sure, crashing };
 
 /// Lines in steps of 1 degree and 2 px that 40 edge pixels lie on, the best first.
 std::vector<Border> lines_of(const marrow::EdgeMap& edges) {
@@ -41,36 +40,33 @@ void turn(marrow::LineSegment& segment, double degrees) {
     *end = middle + Eigen::Rotation2Dd(marrow::radians(degrees)) * (*end - middle);
 }
 
-template <Fault fault>
+template <wrong::Fault fault>
 marrow::ShaftLines shaft(const marrow::EdgeMap& edges, const marrow::View& view,
                          const marrow::List<marrow::View>* views, const LineOptions& options,
                          marrow::Context& context) {
-  if (fault == Fault::crashing && edges.pixels.size() < 2) std::abort();
+  if (fault == "crashing" && edges.pixels.size() < 2) std::abort();
   const Scale scale = checked_scale(edges, view, views, options, context);
   marrow::ShaftLines lines =
       best_pair(edges, view, supported_lines(edges, lines_of(edges), scale, options), scale, options);
-  if (fault == Fault::inner)
+  if (fault == "inner")
     for (const auto& pair : lines.rejected)
       if (pair.reason.find("canal") != std::string::npos) {
         lines.left = pair.left, lines.right = pair.right;
         break;
       }
-  if (fault == Fault::turned) turn(lines.left, 0.3);
-  if (fault == Fault::swapped) std::swap(lines.left, lines.right);
-  if (fault == Fault::sure) lines.width_deviation_mm = 0.001;
+  if (fault == "turned") turn(lines.left, 0.3);
+  if (fault == "swapped") std::swap(lines.left, lines.right);
+  if (fault == "sure") lines.width_deviation_mm = 0.001;
   return lines;
+}
+
+template <wrong::Fault... faults>
+void declare(marrow::Plugin& plugin) {
+  (declare_line_options(
+       plugin.node(std::string("shaft.") + faults.name, shaft<faults>).summary("For a test of the suite")),
+   ...);
 }
 
 }  // namespace
 
-MARROW_PLUGIN(plugin) {
-  const auto add = [&](const char* name, auto* function) {
-    declare_line_options(plugin.node(name, function).summary("For a test of the suite"));
-  };
-  add("shaft.plain", shaft<Fault::none>);
-  add("shaft.inner", shaft<Fault::inner>);
-  add("shaft.turned", shaft<Fault::turned>);
-  add("shaft.swapped", shaft<Fault::swapped>);
-  add("shaft.sure", shaft<Fault::sure>);
-  add("shaft.crashing", shaft<Fault::crashing>);
-}
+MARROW_PLUGIN(plugin) { declare<"plain", "inner", "turned", "swapped", "sure", "crashing">(plugin); }

@@ -210,11 +210,10 @@ def manifest_seeds():
         "traits": ["fast"],
     }
     manifest = {
-        "marrow_manifest": 6,
+        "marrow_manifest": 7,
         "library": "0123456789abcdef0123456789abcdef",
         "refused": "",
         "linked": [{"path": "/usr/lib/a.so", "size": 5}],
-        "searched": [{"path": "/usr/lib", "names": ["a"]}],
         "kinds": [],
         "nodes": [node],
         "writers": [{"type": kind, "extension": ".json", "help": "h"}],
