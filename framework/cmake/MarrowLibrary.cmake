@@ -1,11 +1,12 @@
 # marrow_add_library(NAME FOLDER folder SOURCES file.cpp ... HEADERS file.hpp ... [LINK library that its headers need
-# ...] [NEEDS other library ...] [OBJECTS object library ...] [APART])
+# ...] [NEEDS other library ...] [OBJECTS object library ...] [APART file.cpp ...])
 #
 # A static library for nodes, installed as marrow::NAME: a topic of the toolbox, or what only one kind needs. HEADERS
 # are the public ones; FOLDER says how they are included: marrow/FOLDER/file.hpp. Without sources it is a library of
-# headers. APART: its files need different libraries, so they are compiled one by one.
+# headers. The files after APART are sources that need a heavy library, so they are compiled by themselves: a node that
+# calls none of them does not load it.
 function(marrow_add_library name)
-  cmake_parse_arguments(PARSE_ARGV 1 library "APART" "FOLDER" "SOURCES;HEADERS;LINK;NEEDS;OBJECTS")
+  cmake_parse_arguments(PARSE_ARGV 1 library "" "FOLDER" "SOURCES;HEADERS;LINK;NEEDS;OBJECTS;APART")
   set(target library_${name})
   set(here ${CMAKE_CURRENT_SOURCE_DIR})
   if(NOT CMAKE_CURRENT_SOURCE_DIR MATCHES "/toolbox$")
@@ -13,7 +14,10 @@ function(marrow_add_library name)
   elseif(library_FOLDER MATCHES "/(.*)")
     string(APPEND here /${CMAKE_MATCH_1})
   endif()
+  list(TRANSFORM library_APART PREPEND ${here}/)
+  set_source_files_properties(${library_APART} PROPERTIES SKIP_UNITY_BUILD_INCLUSION ON)
   list(TRANSFORM library_SOURCES PREPEND ${here}/)
+  list(APPEND library_SOURCES ${library_APART})
   list(TRANSFORM library_HEADERS PREPEND ${here}/)
   foreach(object ${library_OBJECTS})
     list(APPEND library_SOURCES $<TARGET_OBJECTS:${object}>)
@@ -26,9 +30,7 @@ function(marrow_add_library name)
       ARCHIVE_OUTPUT_DIRECTORY ${PROJECT_BINARY_DIR}/lib POSITION_INDEPENDENT_CODE ON
       CXX_VISIBILITY_PRESET hidden VISIBILITY_INLINES_HIDDEN ON)
     target_precompile_headers(${target} REUSE_FROM plugin_headers)
-    if(NOT library_APART)
-      marrow_compile_together(${target} 20)
-    endif()
+    marrow_compile_together(${target} 20)
     target_sources(${target} PUBLIC FILE_SET HEADERS BASE_DIRS ${here} FILES ${library_HEADERS})
   else()
     add_library(${target} INTERFACE)
