@@ -59,13 +59,13 @@ distortion::Distortion plate_distortion() {
   return exact;
 }
 
-Value plate_distortions() {
+marrow::Value plate_distortions() {
   List<distortion::Distortion> list;
   list.add("first", plate_distortion());
   distortion::Distortion none = plate_distortion();
   none.terms_px.assign(none.terms_px.size(), Eigen::Vector2d::Zero());
   list.add("second", none);
-  return Value::of<distortion::Distortion>(list, "view");
+  return marrow::Value::of<distortion::Distortion>(list, "view");
 }
 
 double plate_distance_px(const distortion::Distortion& found) {
