@@ -149,10 +149,13 @@ TEST_F(ExperimentLimits, FoldersThatCannotBeFound) {
   expect_fault(kGood, "leads nowhere");
 }
 
-TEST_F(ExperimentLimits, LinksInACircleAndManyFoldersEnd) {
+TEST_F(ExperimentLimits, LinksInACircleEnd) {
   for (int i = 0; i < 10; ++i) fs::create_directory_symlink(".", scratch.path / "cases" / ("l" + std::to_string(i)));
   expect_fault(kHead + "cases: {folders: [cases/*/*/*/*/*/*/*/*/*/*/*/*]}\n" + kVariants + kMetrics,
                "the search goes through more than 300000 files and folders; do links lead in a circle?");
+}
+
+TEST_F(ExperimentLimits, ManyFolders) {
   for (int i = 0; i < 3000; ++i) fs::create_directory(scratch.path / "cases" / ("case-" + std::to_string(i)));
   EXPECT_EQ(read(kGood).cases.size(), 3002u) << diagnostics.text();
 }

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // Wires that their node does not use, and circles of used and unused wires. The pipelines are so short that a reader
 // can follow the wires and see which nodes are in a circle.
+#include <ctime>
+
 #include "tests/framework/pipeline/pipeline_fixture.hpp"
 
 namespace circles_test {
@@ -98,9 +100,9 @@ TEST_F(Circles, ThousandsTakeNoTime) {
   for (int i = 0; i < 20000; ++i)
     nodes += "  n" + std::to_string(i) + ": {uses: test.add, in: {a: n" + std::to_string(i ^ 1) + ", b: n" +
              std::to_string(i == 0 ? 1 : i - 1) + "}}\n";
-  const auto start = std::chrono::steady_clock::now();
+  const std::clock_t start = std::clock();
   read("marrow: 1\nnodes:\n" + nodes + "outputs: {o: n1}\n");
-  EXPECT_LT(std::chrono::steady_clock::now() - start, std::chrono::seconds(20));
+  EXPECT_LT(double(std::clock() - start) / CLOCKS_PER_SEC, 20);
   EXPECT_GT(diagnostics.size(), 0u);
 }
 

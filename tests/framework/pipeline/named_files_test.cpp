@@ -28,7 +28,7 @@ class NamedFilesTest : public testing::Test {
       names.push_back(file.name + (file.is_there ? "" : " (nowhere)"));
     return names;
   }
-  std::string fault() { return marrow::test::MESSAGE_OF(marrow::files_named_by(folder)); }
+  std::string fault() { return MESSAGE_OF(marrow::files_named_by(folder)); }
   Scratch scratch;
   fs::path folder = fs::canonical(scratch.path) / "case";
 };

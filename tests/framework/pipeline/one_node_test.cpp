@@ -81,7 +81,7 @@ TEST(OneNodeTest, AllFaultsComeAtOnceWithTheirPlaces) {
   EXPECT_EQ(faults("test.add", {{"a", other}, {"c", number(1)}}, {{"valu", "1"}}),
             "test.add(a): input 'a' of test.add expects metrics, got stop [first]\n"
             "test.add(c): 'test.add' has no input 'c' [did you mean 'a'?]\n"
-            "test.add(valu): 'test.add' has no option 'valu'\n");
+            "test.add(valu): 'test.add' has no option 'valu' [there are none]\n");
   EXPECT_EQ(faults("test.add", {}), "test.add(a): test.add needs the input 'a', of type metrics [first]\n");
   EXPECT_EQ(number_in(called("test.add", {{"a", number(2)}})), 2) << "the other input is optional";
   EXPECT_HAS(faults("test.constant", {}, {{"count", "-1"}, {"value", "much"}}),
