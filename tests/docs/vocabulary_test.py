@@ -2,14 +2,11 @@
 """docs/vocabulary.md holds the names of all ports and options, with the types and units that they have, and no other
 names; and a name from before is explained where a pipeline uses it."""
 import collections
-import pathlib
 import re
-import subprocess
 import sys
-import tempfile
-import unittest
 
 from harness import MARROW, SOURCE
+from harness.program import Case, main
 
 sys.path.insert(0, str(SOURCE / "tools" / "site"))
 import catalogue  # noqa: E402
@@ -55,7 +52,9 @@ class Table:
         rows[name] = what
 
 
-class Vocabulary(unittest.TestCase):
+class Vocabulary(Case):
+    plugins = []
+
     @classmethod
     def setUpClass(cls):
         cls.nodes = catalogue.Catalogue(MARROW).nodes
@@ -92,21 +91,17 @@ class Vocabulary(unittest.TestCase):
 
     def test_what_was_called_otherwise_is_explained(self):
         lines = [line.split() for line in (SOURCE / "plugins" / "renamed.txt").read_text().splitlines()[1:]]
-        folder = tempfile.TemporaryDirectory(prefix="marrow-vocabulary-")
-        self.addCleanup(folder.cleanup)
-        file = pathlib.Path(folder.name) / "old.yaml"
         for since, of, old, now in lines:
-            said = ""
+            nodes, outputs = [], []
             for name, node in self.nodes.items():
-                for part, given in (("options", "with: {%s: 1}"), ("inputs", "in: {%s: a}"), ("outputs", "")):
+                for part, given in (("options", ", with: {%s: 1}"), ("inputs", ", in: {%s: a0}"), ("outputs", "")):
                     if (name + ".").startswith(of + ".") and has(node, part, now) and not has(node, part, old):
-                        given = given and ", " + given % old
-                        file.write_text(
-                            "marrow: 1\nnodes:\n  a: {uses: %s%s}\noutputs: {x: a.%s}\n" % (name, given, old)
-                        )
-                        said += subprocess.run([MARROW, "check", file], capture_output=True, text=True).stderr
+                        outputs.append("x%d: a%d.%s" % (len(nodes), len(nodes), old))
+                        nodes.append("  a%d: {uses: %s%s}\n" % (len(nodes), name, given and given % old))
+            self.write("old.yaml", "marrow: 1\nnodes:\n%soutputs: {%s}\n" % ("".join(nodes), ", ".join(outputs)))
+            said = self.marrow("check", "old.yaml").stderr
             self.assertIn("'%s' is called '%s' since %s" % (old, now, since), said)
 
 
 if __name__ == "__main__":
-    unittest.main()
+    main()
