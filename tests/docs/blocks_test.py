@@ -10,7 +10,7 @@ import unittest
 
 import yaml
 
-from documents import BUILD, IS_SANITIZED, MARROW, SOURCE, Documents, blocks
+from documents import BUILD, IS_SANITIZED, MARROW, SOURCE, Documents, blocks, main
 
 # A word in capitals stands for what the reader has: FOLDER, FILE, NODE. So do names of the reader's own files.
 OF_THE_READER = re.compile(r"\b[A-Z]{3,}\b|\.\.\.|\.(stl|tif|dcm)\b|\bruns/|\bmetacarpal\b|\.\./shared")
@@ -247,4 +247,4 @@ def declaration_of(text):
 
 
 if __name__ == "__main__":
-    unittest.main(verbosity=2)
+    main()

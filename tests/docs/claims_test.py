@@ -4,11 +4,10 @@ its command does not show, fails. And the README's short pipeline is a part of t
 import pathlib
 import re
 import shutil
-import unittest
 
 import yaml
 
-from documents import BUILD, SOURCE, Documents, blocks
+from documents import BUILD, SOURCE, Documents, blocks, main
 from harness import formats
 from harness.cases import SMALL, copy_case, simulate
 
@@ -124,4 +123,4 @@ class Claims(Documents):
 
 
 if __name__ == "__main__":
-    unittest.main(verbosity=2)
+    main()

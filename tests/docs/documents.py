@@ -1,31 +1,26 @@
 # SPDX-License-Identifier: Apache-2.0
 """What the tests of the documents share: the documents with their blocks of code, and a folder to try them in."""
 import os
-import pathlib
 import re
-import shutil
 import subprocess
 import sys
-import tempfile
-import unittest
 
 from harness import BUILD, MARROW, SOURCE
 
 sys.path.insert(0, str(SOURCE / "tools" / "site"))
 import blocks  # noqa: E402
 import document_pages  # noqa: E402
-from harness.program import IS_SANITIZED  # noqa: F401
+from harness.program import IS_SANITIZED, Case, main  # noqa: F401
 from harness.sample import ALL, sample  # noqa: F401
 
 NOT_RUN = re.compile(r"<!-- not run: (.*) -->")
 
 
-class Documents(unittest.TestCase):
+class Documents(Case):
     @classmethod
     def setUpClass(cls):
         cls.documents = document_pages.documents(SOURCE)
-        cls.folder = pathlib.Path(tempfile.mkdtemp(prefix="marrow-blocks-"))
-        cls.addClassCleanup(shutil.rmtree, cls.folder, ignore_errors=True)
+        cls.folder = cls.shared_folder()
         for name in ("pipelines", "docs", "tools", "tests", "schemas"):
             os.symlink(SOURCE / name, cls.folder / name)
         os.symlink(BUILD, cls.folder / "build")

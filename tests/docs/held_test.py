@@ -19,7 +19,7 @@ try:
 except ImportError:
     public_data = None
 
-from documents import BUILD, IS_SANITIZED, SOURCE, Documents, blocks
+from documents import BUILD, IS_SANITIZED, SOURCE, Documents, blocks, main
 from harness.cases import SMALL, copy_case, simulate
 from harness.wrist import real_trial
 
@@ -239,4 +239,4 @@ class Held(Documents):
 
 
 if __name__ == "__main__":
-    unittest.main(verbosity=2)
+    main()

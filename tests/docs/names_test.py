@@ -1,14 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """Names in the documents: where marrow has no such node, option, command or key, the site is not built."""
-import pathlib
 import re
-import shutil
 import subprocess
 import sys
-import tempfile
-import unittest
 
-from harness import BUILD, SOURCE
+from harness import MARROW, SOURCE
+from harness.program import Case, main
 
 sys.path.insert(0, str(SOURCE / "tools" / "site"))
 import catalogue  # noqa: E402
@@ -25,10 +22,10 @@ RENAMED = """#!/bin/sh
 """
 
 
-class Names(unittest.TestCase):
+class Names(Case):
     @classmethod
     def setUpClass(cls):
-        cls.names = mentions.Names(catalogue.Catalogue(BUILD / "bin" / "marrow"), SOURCE)
+        cls.names = mentions.Names(catalogue.Catalogue(MARROW), SOURCE)
 
     def faults(self, text):
         return [fault for _, fault in mentions.faults_of(text, self.names)]
@@ -83,20 +80,14 @@ class Names(unittest.TestCase):
         self.assertEqual(self.faults("`edges.canny`, `low`, `marrow run FILE --seed 2`, `Cost::value`"), [])
 
     def test_an_option_that_is_renamed_stops_the_site(self):
-        folder = pathlib.Path(tempfile.mkdtemp(prefix="marrow-renamed-"))
-        self.addCleanup(shutil.rmtree, folder, ignore_errors=True)
-        (folder / "bin").mkdir()
-        program = folder / "bin" / "marrow"
-        program.write_text(RENAMED % (BUILD / "bin" / "marrow"))
-        program.chmod(0o755)
-        made = subprocess.run(
-            [SOURCE / "tools" / "docs", "--build", folder, "--out", folder / "site"], capture_output=True, text=True
-        )
+        self.write("bin/marrow", RENAMED % MARROW).chmod(0o755)
+        command = [SOURCE / "tools" / "docs", "--build", self.scratch, "--out", self.scratch / "site"]
+        made = subprocess.run(command, capture_output=True, text=True)
         self.assertEqual(made.returncode, 1)
         self.assertRegex(made.stderr, r"docs/method\.md:\d+: nothing is named 'pixel_step'")
         self.assertTrue(made.stderr.endswith("tools/docs: mend these names; marrow does not know them\n"), made.stderr)
-        self.assertFalse((folder / "site").exists())
+        self.assertFalse((self.scratch / "site").exists())
 
 
 if __name__ == "__main__":
-    unittest.main(verbosity=2)
+    main()

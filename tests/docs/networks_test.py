@@ -1,9 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """The way from PyTorch to a run on the page docs/networks.md works as it is written, where PyTorch is installed."""
 import subprocess
-import unittest
 
-from documents import MARROW, SOURCE, Documents, blocks
+from documents import MARROW, SOURCE, Documents, blocks, main
 
 AROUND = """marrow: 1
 extends: %s
@@ -30,4 +29,4 @@ class Networks(Documents):
 
 
 if __name__ == "__main__":
-    unittest.main(verbosity=2)
+    main()

@@ -1,27 +1,20 @@
 # SPDX-License-Identifier: Apache-2.0
 """The pipelines that make a picture for each node of a kind: which nodes have one, and what is said where none is."""
-import os
-import pathlib
-import shutil
 import struct
 import subprocess
 import sys
-import tempfile
-import unittest
 
 from harness import MARROW, SOURCE
+from harness.program import Case, main
 
 sys.path.insert(0, str(SOURCE / "tools" / "site"))
 import catalogue  # noqa: E402
 import pictures  # noqa: E402
 
 
-class Pictures(unittest.TestCase):
+class Pictures(Case):
     @classmethod
     def setUpClass(cls):
-        cls.folder = pathlib.Path(tempfile.mkdtemp(prefix="marrow-pictures-"))
-        cls.addClassCleanup(shutil.rmtree, cls.folder, ignore_errors=True)
-        os.environ["MARROW_CACHE"] = str(cls.folder / "store")
         cls.catalogue = catalogue.Catalogue(MARROW)
 
     def test_the_kinds_that_have_pictures(self):
@@ -45,19 +38,19 @@ class Pictures(unittest.TestCase):
 
     def test_a_picture_is_made(self):
         file = SOURCE / "docs" / "pictures" / "simulate-board.yaml"
-        path, why = pictures.make_one(MARROW, self.folder, file, "simulate.bead_board", "")
+        path, why = pictures.make_one(MARROW, self.scratch, file, "simulate.bead_board", "")
         self.assertIsNone(why)
-        self.assertEqual(path, self.folder / "simulate.bead_board.png")
+        self.assertEqual(path, self.scratch / "simulate.bead_board.png")
         data = path.read_bytes()
         self.assertEqual((data[:4], struct.unpack(">II", data[16:24])), (b"\x89PNG", (512, 512)))
         self.assertFalse(pictures.is_wide(path))
 
     def test_a_node_that_fails_has_none_and_the_reason_is_kept(self):
         file = SOURCE / "docs" / "pictures" / "edges.yaml"
-        path, why = pictures.make_one(MARROW, self.folder, file, "edges.canny", "/nowhere")
+        path, why = pictures.make_one(MARROW, self.scratch, file, "edges.canny", "/nowhere")
         self.assertIsNone(path)
         self.assertIn("node 'case' (read.case) failed: /nowhere: expected the folder of a case", why)
 
 
 if __name__ == "__main__":
-    unittest.main(verbosity=2)
+    main()

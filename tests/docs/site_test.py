@@ -4,14 +4,12 @@ import json
 import os
 import pathlib
 import re
-import shutil
 import subprocess
 import sys
-import tempfile
-import unittest
 import zlib
 
-from harness import BUILD, MARROW, SOURCE
+from harness import BUILD, MARROW, SOURCE, TEST_PLUGINS
+from harness.program import Case, main
 from harness.shipped import shipped
 
 LINK = re.compile(r'<(?:a|img|link|script)\b[^>]*?\b(?:href|src)="([^"#]*)(?:#([^"]*))?"')
@@ -23,8 +21,7 @@ ASKED = re.split(
 threads, exit codes, troubleshooting""",
 )
 # Nodes of other libraries have their pages, too.
-OTHERS = BUILD / "tests" / "plugins"
-os.environ["MARROW_PLUGIN_PATH"] = str(OTHERS)
+os.environ["MARROW_PLUGIN_PATH"] = str(TEST_PLUGINS)
 
 
 def told(*arguments):
@@ -66,12 +63,10 @@ def keys_of(schema, definitions, path=()):
     return found
 
 
-class Site(unittest.TestCase):
+class Site(Case):
     @classmethod
     def setUpClass(cls):
-        cls.folder = pathlib.Path(tempfile.mkdtemp(prefix="marrow-docs-"))
-        cls.addClassCleanup(shutil.rmtree, cls.folder, ignore_errors=True)
-        cls.site = cls.folder / "site"
+        cls.site = cls.shared_folder() / "site"
         command = [SOURCE / "tools" / "docs", "--build", BUILD, "--out", cls.site, "--without-pictures"]
         cls.made = subprocess.run(command, capture_output=True, text=True)
         print(cls.made.stdout + cls.made.stderr)
@@ -195,4 +190,4 @@ if __name__ == "__main__":
     if not has_packages():
         print("skipped: the site needs the packages python3-sphinx, python3-myst-parser and furo")
         sys.exit(MISSING_PACKAGES)
-    unittest.main(verbosity=2)
+    main()

@@ -6,7 +6,7 @@ import pathlib
 import re
 import unittest
 
-from documents import ALL, BUILD, IS_SANITIZED, SOURCE, Documents, blocks, sample
+from documents import ALL, BUILD, IS_SANITIZED, SOURCE, Documents, blocks, sample, main
 
 AT_ONCE = 2
 # The comparison of a tutorial goes through fewer of its cases than its reader does, but for MARROW_TEST_ALL=1.
@@ -115,4 +115,4 @@ class Tutorials(Documents):
 
 
 if __name__ == "__main__":
-    unittest.main(verbosity=2)
+    main()

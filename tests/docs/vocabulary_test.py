@@ -3,9 +3,9 @@
 they have, and no other names."""
 import collections
 import sys
-import unittest
 
 from harness import MARROW, SOURCE
+from harness.program import Case, main
 
 sys.path.insert(0, str(SOURCE / "tools" / "site"))
 import catalogue  # noqa: E402
@@ -35,7 +35,9 @@ class Table:
         rows[name] = what
 
 
-class Vocabulary(unittest.TestCase):
+class Vocabulary(Case):
+    plugins = []
+
     @classmethod
     def setUpClass(cls):
         cls.nodes = catalogue.Catalogue(MARROW).nodes
@@ -72,4 +74,4 @@ class Vocabulary(unittest.TestCase):
 
 
 if __name__ == "__main__":
-    unittest.main()
+    main()

@@ -1,7 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
 """A comparison of 18 cheap cells, for tests of chunks and clusters, and the Slurm cluster in which some of them run."""
-import csv
-import json
 import os
 import pathlib
 import shutil
@@ -46,18 +44,14 @@ def is_idle():
 class Cluster(Case):
     def setUp(self):
         super().setUp()
-        self.environment = {
-            **os.environ,
-            "MARROW_PLUGIN_PATH": str(TEST_PLUGINS),
-            "MARROW_CACHE": str(self.scratch / "cache"),
-        }
+        plugins = {"MARROW_PLUGIN_PATH": str(TEST_PLUGINS)}
+        self.environment = {**os.environ, **plugins, "MARROW_CACHE": str(self.scratch / "cache")}
         self.file = self.experiment()
 
     def experiment(self, value="0.01", more="", cases=CASES, variants=VARIANTS):
         self.write("p.yaml", PIPELINE % value)
         shutil.rmtree(self.scratch / "cases", ignore_errors=True)
         for i in range(cases):
-            (self.scratch / "cases" / str(i)).mkdir(parents=True, exist_ok=True)
             self.write("cases/%d/data" % i, "case %d" % i)
         variants = ", ".join("v%d: {m.value: %d}" % (i, i) for i in range(variants))
         return self.write(
@@ -79,22 +73,27 @@ class Cluster(Case):
         return result
 
     def compare(self, out, *arguments, code=0, **environment):
-        return self.run_program(
-            MARROW, "compare", self.file, "--out", self.scratch / out, *arguments, code=code, **environment
-        )
+        command = [MARROW, "compare", self.file, "--out", self.scratch / out, *arguments]
+        return self.run_program(*command, code=code, **environment)
+
+    def gather(self, out, code=0):
+        return self.compare(out, "--gather", "--quiet", "--shown", "0", code=code)
 
     def figures(self, out):
         """Everything that the tables say of each cell, but for times, tries and keys, which depend on paths."""
-        with open(self.scratch / out / "cells.csv", newline="") as stream:
-            rows = list(csv.DictReader(stream))
+        rows = self.csv(self.scratch / out / "cells.csv")
         cells = [row["cell"] for row in rows]
         self.assertEqual(len(cells), len(set(cells)), "a cell is counted twice")
         left_out = ("seconds", "tries", "key")
         return {row.pop("cell"): {k: v for k, v in row.items() if k not in left_out} for row in rows}
 
+    def count(self, out, status):
+        """How many cells have this status."""
+        return sum(row["status"] == status for row in self.figures(out).values())
+
     def answers(self, out):
         """The statistics in comparison.json without times."""
-        answer = json.loads((self.scratch / out / "comparison.json").read_text())
+        answer = self.answer(out)
         for variant in answer["variants"]:
             variant.pop("seconds", None)
         return answer["variants"], answer["comparisons"]
@@ -106,3 +105,11 @@ class Cluster(Case):
     def plan(self, out):
         folder = self.scratch / out / "plans"
         return folder / ((folder / "latest.txt").read_text().strip() + ".json")
+
+    def names(self, out):
+        """The chunks of the plan."""
+        plan = self.plan(out)
+        return (plan.parent / (plan.stem + "-chunks.txt")).read_text().split()
+
+    def chunk(self, out, name, **environment):
+        return self.run_program(MARROW, "chunk", self.plan(out), name, "--quiet", **environment)

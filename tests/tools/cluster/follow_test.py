@@ -3,9 +3,8 @@
 names of Slurm's stand for the cluster: sbatch runs an array at once, and a job that gathers only when it is told."""
 import os
 import signal
-import subprocess
 
-from cluster_cases import MARROW, VARIANTS, Cluster, main, wait_until
+from cluster_cases import VARIANTS, Cluster, main, wait_until
 
 CELLS = 2 * VARIANTS
 SILENCE_s = 8  # longer than one question takes on a busy machine, which must end before
@@ -39,7 +38,6 @@ class Follow(Cluster):
     def setUp(self):
         super().setUp()
         self.programs = self.scratch / "programs"
-        self.programs.mkdir()
         for name in ("sbatch", "squeue", "scancel", "sacct"):
             self.write("programs/" + name, PROGRAM).chmod(0o755)
         self.environment["PATH"] = str(self.programs) + ":" + os.environ["PATH"]
@@ -48,11 +46,11 @@ class Follow(Cluster):
         self.file = self.experiment(cases=2)
 
     def says(self, program, code, text):
-        (self.programs / (program + ".new")).write_text("%d\n%s" % (code, text))
-        (self.programs / (program + ".new")).rename(self.programs / (program + ".says"))
+        said = self.write("programs/%s.new" % program, "%d\n%s" % (code, text))
+        said.rename(said.with_suffix(".says"))
 
     def asked(self, start):
-        return [line for line in (self.programs / "asked").read_text().split("\n") if line.startswith(start)]
+        return [line for line in self.read("programs/asked").split("\n") if line.startswith(start)]
 
     def wait(self, code):
         return self.compare("out", "--on", "slurm", "--profile", self.profile, "--wait", "--quiet", code=code)
@@ -102,12 +100,7 @@ class Follow(Cluster):
 
     def test_ctrl_c_while_the_cluster_does_not_answer(self):
         self.write("programs/squeue", "#!/bin/sh\ntouch %s\nexec sleep 1000\n" % (self.scratch / "asks"))
-        process = subprocess.Popen(
-            [MARROW, "compare", self.file, "--out", self.out, "--on", "slurm", "--wait"],
-            env=self.environment,
-            stderr=subprocess.PIPE,
-            text=True,
-        )
+        process = self.start("compare", self.file, "--out", self.out, "--on", "slurm", "--wait")
         wait_until((self.scratch / "asks").exists, "squeue was not started")
         process.send_signal(signal.SIGINT)
         said = process.communicate(timeout=300)[1]

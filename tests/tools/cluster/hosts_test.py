@@ -1,4 +1,3 @@
-#!/usr/bin/python3
 # SPDX-License-Identifier: Apache-2.0
 """Three hosts share results in a folder that refuses locks, shows files late and fails now and then; their clocks
 differ, and some of their processes are killed.

@@ -66,20 +66,17 @@ class Quoting(Cluster):
         """An experiment in a folder of this name, with files of this name in it."""
         self.name = name
         self.folder = self.scratch / ("folder" + str(len(list(self.scratch.iterdir())))) / name
-        self.folder.mkdir(parents=True)
         home = self.scratch / "home"
-        home.mkdir(exist_ok=True)
-        for part in ("tmp", "programs"):
-            (self.folder / (part + name)).mkdir()
+        for part in (self.folder / ("tmp" + name), self.folder / ("programs" + name), home):
+            part.mkdir(parents=True, exist_ok=True)
         for i, case in enumerate(CASES):
-            (self.folder / ("cases" + name) / case).mkdir(parents=True)
-            (self.folder / ("cases" + name) / case / "data").write_text("case %d" % i)
-        (self.folder / (name + ".yaml")).write_text("name: p\n" + PIPELINE % "0.01")
-        self.file = self.folder / ("e" + name)
+            self.write(self.data_of(case), "case %d" % i)
+        self.write(self.folder / (name + ".yaml"), "name: p\n" + PIPELINE % "0.01")
         variants = ", ".join("%s: {m.value: %d}" % (json.dumps(one), i) for i, one in enumerate(VARIANTS))
-        self.file.write_text(
+        self.file = self.write(
+            self.folder / ("e" + name),
             "experiment: 1\nname: x\npipeline: %s\ncases: {folders: [cases*/*]}\nmetrics: [number.value]\n"
-            "timed_cells: 0\nsuccess: {number.value: 4}\nvariants: {%s}\n" % (json.dumps(name + ".yaml"), variants)
+            "timed_cells: 0\nsuccess: {number.value: 4}\nvariants: {%s}\n" % (json.dumps(name + ".yaml"), variants),
         )
         self.program = MARROW
         if name == EVERYTHING:  # the program, too, has a place of this name
@@ -91,13 +88,16 @@ class Quoting(Cluster):
             **usual,
             "HOME": str(home),
             "TMPDIR": str(self.folder / ("tmp" + name)),  # but GNU parallel refuses such a place
-            "MARROW_PLUGIN_PATH": str(self.plugins()),
+            "MARROW_PLUGIN_PATH": str(self.linked_plugins()),
             "MARROW_CACHE": "cache" + name,  # it starts at the folder in which the plan is made
             "MARROW_$(touch executed)": "a name that no setting has",
         }
         self.out = self.folder / ("out" + name)
 
-    def plugins(self):
+    def data_of(self, case):
+        return self.folder / ("cases" + self.name) / case / "data"
+
+    def linked_plugins(self):
         place = self.folder / ("plugins" + self.name)
         place.symlink_to(TEST_PLUGINS)
         return place
@@ -148,7 +148,7 @@ class Quoting(Cluster):
 
     def lose_a_case(self):
         """From now on, tasks refuse the second case."""
-        (self.folder / ("cases" + self.name) / CASES[1] / "data").write_text("other")
+        self.write(self.data_of(CASES[1]), "other")
 
     def expect_lost(self, result, *reasons, where="stderr"):
         """Half of the cells are lost, and named with their reasons. Tables and report have the others."""
@@ -190,11 +190,8 @@ class OneMachine(Quoting):
         said = self.compare_here("--gather", "--quiet", code=1).stderr
         self.assertIn("%d of %d %s" % (CELLS, CELLS, LOST), said)
         self.assertEqual(said.count(": no task left its row\n"), CELLS)
-        self.file.write_text(
-            self.file.read_text().replace(
-                "variants: {", "variants: {%s, " % ", ".join("v%d: {m.value: 1}" % i for i in range(5))
-            )
-        )
+        more = ", ".join("v%d: {m.value: 1}" % i for i in range(5))
+        self.write(self.file, self.read(self.file).replace("variants: {", "variants: {%s, " % more))
         self.compare_here("--emit", "parallel")
         said = self.compare_here("--gather", "--quiet", code=1).stderr
         self.assertIn("22 of 22 " + LOST, said)
@@ -205,7 +202,7 @@ class OneMachine(Quoting):
     def test_cells_that_were_tried_are_not_lost(self):
         """Every cell fails, and the command says so, but each was tried."""
         self.make("a b")
-        self.file.write_text(self.file.read_text().replace("m.value: ", "m.how: error, m.value: "))
+        self.write(self.file, self.read(self.file).replace("m.value: ", "m.how: error, m.value: "))
         said = self.compare_here("--quiet").stdout
         self.assertIn("\nfailed cells\n  a b/0 $(touch executed)/", said)
         self.assertNotIn("lost", said)
@@ -213,14 +210,12 @@ class OneMachine(Quoting):
     def test_reasons(self):
         self.make("a b")
         self.compare_here("--emit", "parallel")
-        plan = self.plan(self.out)
-        names = (plan.parent / (plan.stem + "-chunks.txt")).read_text().split()
-        self.run_program(MARROW, "chunk", plan, names[0])
-        rows = self.out / "rows"
-        file = rows / (names[0] + ".jsonl")
-        lines = file.read_text().split("\n")
-        file.write_text("\n".join([lines[0][:-20], *lines[1:]]))
-        (rows / (names[1] + ".host.part")).write_text("")
+        names = self.names(self.out)
+        self.chunk(self.out, names[0])
+        file = self.out / "rows" / (names[0] + ".jsonl")
+        lines = self.read(file).split("\n")
+        self.write(file, "\n".join([lines[0][:-20], *lines[1:]]))
+        self.write(self.out / "rows" / (names[1] + ".host.part"), "")
         said = self.compare_here("--gather", "--quiet", code=1).stderr
         self.assertIn(
             "rows/%s.jsonl has no undamaged row of it with its case and plugins as they are now" % names[0], said
@@ -333,9 +328,8 @@ class Slurm(Quoting):
     def test_a_fault_of_marrow_is_the_reason(self):
         self.make("a b")
         setup = "setup: ['case \"$1\" in *-1) echo other > %s;; esac']\n"
-        data = self.folder / ("cases" + self.name) / CASES[1] / "data"
         link = self.scratch / "data"
-        link.symlink_to(data)
+        link.symlink_to(self.data_of(CASES[1]))
         self.expect_lost(self.submit(setup % link, code=1), "(FAILED): the case ", CHANGED)
 
     def test_a_backslash_is_refused_in_words(self):

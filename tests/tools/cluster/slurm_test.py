@@ -14,7 +14,6 @@ from cluster_cases import (
     CAN_START_CLUSTER,
     CASES,
     IN_A_CLUSTER,
-    MARROW,
     VARIANTS,
     Cluster,
     is_idle,
@@ -66,21 +65,18 @@ class OnSlurm(Cluster):
             self.tables[experiment] = self.figures("local"), self.answers("local")
         self.assertEqual((self.figures("out"), self.answers("out")), self.tables[experiment])
 
-    def start(self):
-        process = subprocess.Popen(
-            [MARROW, "compare", self.file, "--out", self.out, "--on", "slurm", "--profile", self.profile, "--wait"],
-            env=self.environment,
-            cwd=self.scratch,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT,
-            text=True,
-        )
-        self.addCleanup(process.wait)
-        self.addCleanup(process.kill)
-        return process
+    def start_and_wait(self):
+        command = ["compare", self.file, "--out", self.out, "--on", "slurm", "--profile", self.profile, "--wait"]
+        return self.start(*command, stderr=subprocess.STDOUT)
 
-    def rows(self):
-        return list((self.out / "rows").glob("*.jsonl"))
+    def end_of(self, process, code=0):
+        said, _ = process.communicate(timeout=600)
+        self.assertEqual(process.returncode, code, said)
+        return said
+
+    def begin_anew(self):
+        shutil.rmtree(self.out)
+        shutil.rmtree(self.scratch / "cache")
 
     def parts_with_rows(self):
         return [part for part in (self.out / "rows").glob("*.part") if part.stat().st_size > 0]
@@ -95,7 +91,7 @@ class OnSlurm(Cluster):
     def test_same_figures(self):
         said = self.submit("--wait").stdout
         self.assertIn("%d cells are left, in %d chunks" % (CASES * VARIANTS, CASES), said)
-        self.assertEqual({row["status"] for row in self.figures("out").values()}, {"done"})
+        self.assertEqual(self.count("out", "done"), CASES * VARIANTS)
         self.expect_same_as_here()
         said = self.compare("out", "--status").stdout
         self.assertIn("{0} of {0} cells in {1} of {1} chunks".format(CASES * VARIANTS, CASES), said)
@@ -123,7 +119,7 @@ class OnSlurm(Cluster):
 
     def test_killed_tasks_and_controller(self):
         self.experiment("1.5", cases=10)  # long enough that tasks are left to be held
-        process = self.start()
+        process = self.start_and_wait()
         for _ in range(2):
             wait_until(lambda: self.send(signal.SIGKILL), "no task came")
             time.sleep(1)
@@ -132,8 +128,7 @@ class OnSlurm(Cluster):
         time.sleep(2)
         self.daemon("start", "slurmctld")
         self.send(signal.SIGCONT)
-        said, _ = process.communicate(timeout=600)
-        self.assertEqual(process.returncode, 0, said)
+        self.end_of(process)
         self.expect_same_as_here()
         self.assertRegex(self.compare("out", "--status").stdout, "submitted [23] times")  # the killed tasks' chunks
 
@@ -148,13 +143,11 @@ class OnSlurm(Cluster):
             self.assertIn(words + "; see log/", reason)
 
     def give_place_away(self, code=0):
-        process = self.start()
+        process = self.start_and_wait()
         wait_until(lambda: len(tasks()) == 2, "no two tasks came")
-        subprocess.run(
-            ["sbatch", "--quiet", "-p", "urgent", "-c", "2", "-o", "/dev/null", "--wrap", "sleep 1"], check=True
-        )
-        said, _ = process.communicate(timeout=600)
-        self.assertEqual(process.returncode, code, said)
+        urgent = ["sbatch", "--quiet", "-p", "urgent", "-c", "2", "-o", "/dev/null", "--wrap", "sleep 1"]
+        subprocess.run(urgent, check=True)
+        self.end_of(process, code)
 
     def test_place_given_to_another_job(self):
         self.only_with_all()
@@ -163,8 +156,7 @@ class OnSlurm(Cluster):
         self.give_place_away()
         self.expect_same_as_here()
         self.assertIn("submitted 2 times", self.compare("out", "--status").stdout)
-        shutil.rmtree(self.out)
-        shutil.rmtree(self.scratch / "cache")
+        self.begin_anew()
         self.profile = self.write("profile.yaml", ONE_TRY + "partition: cheap\n")
         self.give_place_away(code=1)
         self.expect_reasons("the cluster gave its place to another job (PREEMPTED)")
@@ -176,30 +168,26 @@ class OnSlurm(Cluster):
         self.experiment("0.2", more=", memory: {m.how: memory}", cases=2)
         self.profile = self.write("profile.yaml", ONE_TRY + "memory_mb: 300\n")
         self.submit("--wait")  # the system kills the largest process, which runs the cell; the task goes on
-        self.assertEqual(sum(row["status"] == "done" for row in self.figures("out").values()), 2 * VARIANTS)
+        self.assertEqual(self.count("out", "done"), 2 * VARIANTS)
         reason = "crashed in node 'm': Killed, as by a system whose memory, or that of a cluster's job, runs out"
         self.assertEqual(self.reasons(), {reason})
-        shutil.rmtree(self.out)
-        shutil.rmtree(self.scratch / "cache")
-        process = self.start()
+        self.begin_anew()
+        process = self.start_and_wait()
         wait_until(lambda: len(self.parts_with_rows()) == 2, "no two tasks came")
         for task in tasks():  # now it kills the task itself, but not its processes that run cells
             pathlib.Path("/proc/%d/oom_score_adj" % task).write_text("1000")
-        said, _ = process.communicate(timeout=600)
-        self.assertEqual(process.returncode, 1, said)
+        self.end_of(process, 1)
         self.expect_reasons("it took more memory than the cluster allows (OUT_OF_MEMORY)")
-        self.assertEqual(sum(row["status"] == "done" for row in self.figures("out").values()), 2 * VARIANTS)
+        self.assertEqual(self.count("out", "done"), 2 * VARIANTS)
 
     def test_ctrl_c_and_again(self):
         self.only_with_all()
         self.experiment("2", cases=10)
-        process = self.start()
+        process = self.start_and_wait()
         wait_until(tasks, "no task came")
         time.sleep(3)
         process.send_signal(signal.SIGINT)
-        said, _ = process.communicate(timeout=300)
-        self.assertEqual(process.returncode, 130, said)
-        self.assertIn("its tasks were cancelled; the same command goes on from here", said)
+        self.assertIn("its tasks were cancelled; the same command goes on from here", self.end_of(process, 130))
         wait_until(lambda: not tasks(), "tasks go on")
         wait_until(is_idle, "the cluster goes on")
         self.submit("--wait")
@@ -211,9 +199,7 @@ class OnSlurm(Cluster):
         self.out.mkdir()
         subprocess.run(["mount", "-t", "tmpfs", "-o", "size=300k", "none", self.out], check=True)
         try:
-            process = self.start()
-            said, _ = process.communicate(timeout=600)
-            self.assertEqual(process.returncode, 2, said)
+            said = self.end_of(self.start_and_wait(), 2)
             self.assertRegex(said, "the cluster holds tasks back|ended without a report")
             subprocess.run(["mount", "-o", "remount,size=100m", self.out], check=True)
             self.submit("--wait")
@@ -226,7 +212,7 @@ class OnSlurm(Cluster):
         self.experiment(more=", crash: {m.how: crash}")
         self.submit("--wait")
         self.expect_same_as_here()
-        self.assertEqual(sum(row["status"] == "failed" for row in self.figures("out").values()), CASES)
+        self.assertEqual(self.count("out", "failed"), CASES)
 
     def test_refused(self):
         self.profile = self.write("profile.yaml", PROFILE + "partition: none\n")
@@ -242,8 +228,7 @@ class OnSlurm(Cluster):
         self.profile = self.write("profile.yaml", ONE_TRY + "minutes: 1\n")
         self.submit("--wait", code=1)
         self.expect_reasons("the cluster's time limit was reached (TIMEOUT)")
-        done = [cell for cell, row in self.figures("out").items() if row["status"] == "done"]
-        self.assertEqual(len(done), 2 * VARIANTS)  # the rows that the tasks had made count
+        self.assertEqual(self.count("out", "done"), 2 * VARIANTS)  # the rows that the tasks had made count
 
 
 if __name__ == "__main__":

@@ -63,11 +63,11 @@ def before(nodes, name):
 class Shipped(Case):
     @classmethod
     def setUpClass(cls):
-        cls.nodes = {pipeline: nodes_of(pipeline) for pipeline in shipped()}
+        cls.pipelines = {pipeline: nodes_of(pipeline) for pipeline in shipped()}
 
     def test_check_agrees_for_every_node_in_the_places_of_the_shipped_pipelines(self):
         verdicts = {"yes": 0, "with more": 0, "no": 0}
-        for pipeline, name, _ in sample(places(self.nodes), 16, key=kind_of):
+        for pipeline, name, _ in sample(places(self.pipelines), 16, key=kind_of):
             seen = set()
             for fit in fits_of(pipeline, name).values():
                 verdicts[fit["fits"]] += 1
@@ -88,7 +88,7 @@ class Shipped(Case):
 
     def test_what_a_picture_calls_before_is_the_start_of_the_search_whose_result_it_calls_after(self):
         compared = 0
-        for file, nodes in self.nodes.items():
+        for file, nodes in self.pipelines.items():
             for name, node in nodes.items():
                 wires = node.get("in", {})
                 if not node.get("uses", "").startswith("render.") or "start" not in wires:

@@ -1,6 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
 """What people expect of any command line: short options, a dry run, the standard input, JSON, and columns that wrap."""
-import json
 import os
 import re
 import subprocess

@@ -1,7 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
 """A small run of the pipeline for closed nailing, and an implant from files as a person gives it."""
-import json
-
 import yaml
 
 from harness import SOURCE

@@ -23,7 +23,7 @@ class Names(Case):
         for name in ("run.json", "log.txt", "pipeline.yaml"):
             self.write("a/" + name, "mine")
         below = self.scratch / "a" / "b"
-        for name in ("../../x", "..", ".", "/tmp/marrow-x", "a\\\\b", "x\\e[2J"):
+        for name in ("../../x", "x\\e[2J"):  # hostile_pipelines_test.cpp has others
             self.write("a/b/p.yaml", NUMBER % ('name: "%s"\n' % name))
             before = self.everything()
             said = ["p.yaml:2:1: error: a pipeline's name becomes a file name: '", "hint: use at most 100 letters"]

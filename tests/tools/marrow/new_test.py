@@ -22,6 +22,7 @@ outputs: {verdict: null, pose: null, errors: null, overlay: null, edges: edges}
 
 class New(Case):
     plugins = []
+    has_own_store = False
 
     def refused_with(self, *arguments):
         """The one sentence for which nothing is made."""

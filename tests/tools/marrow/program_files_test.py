@@ -48,18 +48,18 @@ class Files(Programs):
         self.write("ct.mha", mha(grid, VALUES, "MET_FLOAT"))
         self.ct = {"uses": "read.volume", "with": {"path": "ct.mha"}}
 
-    def copied(self, kind, inputs, source, sources=()):
+    def copied(self, kind, inputs, source):
         """Runs programs that copy {input.extension}, one for each of these inputs. Gives the file that each was given,
         and what was made of its output."""
-        nodes = {}
+        nodes, given = {}, []
         for i, place in enumerate(inputs):
             of, extension = place.split(".", 1)
-            words = ["{%s}" % place, "{output.%s}" % extension, str(self.scratch / ("kept%d.%s" % (i, extension)))]
-            node = self.node(kind, ["python3", "{files.1}", *words], {of: "source"}, files=["copied.py"])
-            nodes["n%d" % i] = node
-        self.run_it({**dict(sources), "source": source, **nodes}, outputs={name: name for name in nodes})
+            given.append(self.scratch / ("kept%d.%s" % (i, extension)))
+            words = ["{files.1}", "{%s}" % place, "{output.%s}" % extension, str(given[-1])]
+            nodes["n%d" % i] = self.node(kind, ["python3", *words], {of: "source"}, files=["copied.py"])
+        self.run_it({"source": source, **nodes}, outputs={name: name for name in nodes})
         made = [next((self.scratch / "out/outputs").glob(name + ".*")) for name in nodes]
-        return [(next(self.scratch.glob("kept%d.*" % i)), file) for i, file in enumerate(made)]
+        return list(zip(given, made))
 
     def expect_grid(self, keys):
         """NIfTI has 32 bits for these numbers."""
