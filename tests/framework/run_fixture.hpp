@@ -41,7 +41,7 @@ class RunTest : public testing::Test {
   static double number_of(const marrow::Value& metrics, std::size_t item = 0) {
     return metrics.as<marrow::Metrics>().items.at(item).value;
   }
-  double number(const marrow::RunResult& result, std::size_t index = 0) const {
+  double result_of(const marrow::RunResult& result, std::size_t index = 0) const {
     return number_of(output(result, index));
   }
   /// Whether an event of this kind says this.

@@ -7,7 +7,7 @@
 #include <map>
 
 #include "experiment_layers.hpp"
-#include "experiment_text.hpp"
+#include "experiment_sections.hpp"
 #include "folder_search.hpp"
 #include "marrow/base/error.hpp"
 #include "marrow/base/file_names.hpp"

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "experiment_figures.hpp"
-#include "experiment_text.hpp"
+#include "experiment_sections.hpp"
 #include "marrow/runtime/node/types.hpp"
 #include "marrow/runtime/pipeline/one_node.hpp"
 #include "marrow/runtime/pipeline/pipeline_names.hpp"

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "experiment_factors.hpp"
+#include "experiment_sections.hpp"
 
 #include "marrow/base/number_text.hpp"
 #include "marrow/compare/experiment_notes.hpp"

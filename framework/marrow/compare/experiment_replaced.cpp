@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Values that another section of the same file would silently replace.
-#include "experiment_replaced.hpp"
+#include "experiment_sections.hpp"
 
 #include <algorithm>
 

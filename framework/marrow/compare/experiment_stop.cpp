@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "experiment_stop.hpp"
+#include "experiment_sections.hpp"
 
 #include <algorithm>
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "experiment_sweep.hpp"
+#include "experiment_sections.hpp"
 
 #include <cmath>
 #include <set>

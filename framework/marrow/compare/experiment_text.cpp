@@ -1,17 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "experiment_text.hpp"
+#include "experiment_sections.hpp"
 
 #include <algorithm>
 #include <map>
 #include <set>
 
 #include "draw.hpp"
-#include "experiment_factors.hpp"
 #include "experiment_layers.hpp"
-#include "experiment_replaced.hpp"
-#include "experiment_stop.hpp"
-#include "experiment_sweep.hpp"
-#include "experiment_tune.hpp"
 #include "marrow/base/characters.hpp"
 #include "marrow/base/file_names.hpp"
 #include "marrow/base/number_text.hpp"

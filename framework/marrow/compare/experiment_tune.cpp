@@ -1,12 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "experiment_tune.hpp"
+#include "experiment_sections.hpp"
 
 #include <charconv>
 #include <cmath>
 #include <cstdlib>
 
-#include "experiment_replaced.hpp"
-#include "experiment_sweep.hpp"
 #include "marrow/base/number_text.hpp"
 
 namespace marrow::compare {

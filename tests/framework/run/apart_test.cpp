@@ -28,7 +28,7 @@ class ApartTest : public run_fixture::RunTest {
   /// Why the reader failed, from the file's name on; everything else must have gone on.
   std::string failure(const std::string& word, const std::string& more = "") {
     const RunResult result = read_word(word, more);
-    EXPECT_EQ(number(result, 1), 5);
+    EXPECT_EQ(result_of(result, 1), 5);
     for (std::size_t i = 0; i < result.nodes.size(); ++i)
       if (result.nodes[i].status == NodeRecord::Status::failed) {
         const std::string reason = result.nodes[i].reason;

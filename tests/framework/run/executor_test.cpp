@@ -20,7 +20,7 @@ class ExecutorTest : public run_fixture::RunTest {
  protected:
   double drawn(const std::string& node, std::uint64_t seed) {
     settings.seed = seed;
-    return number(run("  " + node + ": {uses: test.draw}\n", "o: " + node));
+    return result_of(run("  " + node + ": {uses: test.draw}\n", "o: " + node));
   }
 };
 
@@ -30,7 +30,7 @@ TEST_F(ExecutorTest, AddsAlongTheGraph) {
           "test.add, in: {a: a, b: c}}\n",
           "o: d");
   EXPECT_FALSE(result.failed());
-  EXPECT_EQ(number(result), 15);
+  EXPECT_EQ(result_of(result), 15);
 }
 
 TEST_F(ExecutorTest, MapsOverListsInStepAndNested) {
@@ -52,7 +52,7 @@ TEST_F(ExecutorTest, MapsOverListsInStepAndNested) {
 }
 
 TEST_F(ExecutorTest, PicksOneItemByName) {
-  EXPECT_EQ(number(run("  s: {uses: test.sides}\n  a: {uses: test.add, in: {a: s.both.b}}\n", "o: a")), 20);
+  EXPECT_EQ(result_of(run("  s: {uses: test.sides}\n  a: {uses: test.add, in: {a: s.both.b}}\n", "o: a")), 20);
   const RunResult result = run(
       "  s: {uses: test.sides, with: {names: [left, right]}}\n  a: {uses: test.add, in: {a: s.both.rigth}}\n", "o: a");
   EXPECT_TRUE(result.failed());
@@ -62,12 +62,14 @@ TEST_F(ExecutorTest, PicksOneItemByName) {
 }
 
 TEST_F(ExecutorTest, ListLiteralAndListOfOne) {
-  EXPECT_EQ(number(run("  c: {uses: test.constant, with: {value: 5}}\n  s: {uses: test.sides}\n  n: {uses: test.sum, "
-                       "in: {items: [c, s.right]}}\n",
-                       "o: n")),
-            7);
   EXPECT_EQ(
-      number(run("  c: {uses: test.constant, with: {value: 5}}\n  n: {uses: test.sum, in: {items: c}}\n", "o: n")), 5);
+      result_of(run("  c: {uses: test.constant, with: {value: 5}}\n  s: {uses: test.sides}\n  n: {uses: test.sum, "
+                    "in: {items: [c, s.right]}}\n",
+                    "o: n")),
+      7);
+  EXPECT_EQ(
+      result_of(run("  c: {uses: test.constant, with: {value: 5}}\n  n: {uses: test.sum, in: {items: c}}\n", "o: n")),
+      5);
 }
 
 TEST_F(ExecutorTest, ListsOutOfStepAreAFault) {
@@ -96,7 +98,7 @@ TEST_F(ExecutorTest, FailureNamesNodeInputsAndReasonAndLeavesOthersGoing) {
   EXPECT_EQ(number_of(g.items[0]), 10) << "the item that did not fail goes on";
   EXPECT_EQ(g.items[1].missing, "node 'f' failed");
   EXPECT_EQ(result.nodes[3].status, Status::not_run);
-  EXPECT_EQ(number(result, 2), 1);
+  EXPECT_EQ(result_of(result, 2), 1);
 }
 
 TEST_F(ExecutorTest, WhatIsBehindAFailureNamesItsFirstCauseAndIsCounted) {
@@ -121,7 +123,7 @@ TEST_F(ExecutorTest, WhatIsNotThereIsSkippedAndNoFailure) {
           "a: a, b: b");
   EXPECT_FALSE(result.failed());
   EXPECT_TRUE(output(result, 0).is_absent());
-  EXPECT_EQ(number(result, 1), 1) << "an optional input may be absent";
+  EXPECT_EQ(result_of(result, 1), 1) << "an optional input may be absent";
   EXPECT_EQ(event_text(RunEvent::Kind::skipped), "there is no 'a'");
 }
 
@@ -137,7 +139,7 @@ TEST_F(ExecutorTest, GivenValuesAreNotComputedAgain) {
   const RunResult first = run(nodes, "o: e");
   settings.given["d"] = first.nodes[1].outputs;
   const RunResult second = run(nodes, "o: e");
-  EXPECT_EQ(number(second), 20);
+  EXPECT_EQ(result_of(second), 20);
   EXPECT_EQ(second.nodes[0].status, Status::not_needed);
   EXPECT_EQ(second.nodes[1].status, Status::not_needed);
 }
@@ -153,8 +155,8 @@ TEST_F(ExecutorTest, GivenValuesWithoutKeysAreToldApartByContent) {
       run("  c: {uses: test.constant}\n  d: {uses: test.constant}\n  e: {uses: test.add, in: {a: c}}\n  f: {uses: "
           "test.add, in: {a: d}}\n",
           "e: e, f: f");
-  EXPECT_EQ(number(result, 0), 1);
-  EXPECT_EQ(number(result, 1), 2);
+  EXPECT_EQ(result_of(result, 0), 1);
+  EXPECT_EQ(result_of(result, 1), 2);
 }
 
 TEST_F(ExecutorTest, SameRecipeIsComputedOnce) {
@@ -192,7 +194,7 @@ TEST_F(ExecutorTest, FunctionKeepsItsInputsAlive) {
       run("  c: {uses: test.constant, with: {value: 5}}\n  f: {uses: test.adder, in: {amount: c}}\n  a: {uses: "
           "test.apply, in: {adder: f, to: c}}\n",
           "a: a, f: f");
-  EXPECT_EQ(number(result), 10);
+  EXPECT_EQ(result_of(result), 10);
   const marrow::Value function = output(result, 1);
   EXPECT_EQ(function.type.content, nullptr) << "a function has no content";
   EXPECT_NE(function.key, marrow::Digest{});
@@ -243,7 +245,7 @@ TEST_F(ExecutorTest, CancelStopsWithinANode) {
   EXPECT_TRUE(result.cancelled());
   EXPECT_FALSE(result.failed());
   EXPECT_LT(result.seconds, 50) << "the node works for a minute";
-  EXPECT_EQ(number(result, 1), 1);
+  EXPECT_EQ(result_of(result, 1), 1);
 }
 
 TEST_F(ExecutorTest, RunFolderRefusesToOverwrite) {

@@ -6,7 +6,6 @@
 #include <locale.h>
 #include <signal.h>
 
-#include <algorithm>
 #include <limits>
 #include <opencv2/core.hpp>
 #include <optional>
@@ -112,7 +111,6 @@ TEST_F(HostileNodes, WhatRanBesideThemIsRightOrFails) {
     store->collect(0);
     const std::vector<marrow::Digest> beside = healthy(run_beside(hostile(how), "bad", 4), reason);
     for (std::size_t i = 0; i < right.size(); ++i) EXPECT_TRUE(beside[i] == right[i] || beside[i] == marrow::Digest{});
-    EXPECT_EQ(std::count(beside.begin(), beside.end(), marrow::Digest{}) > 0, !reason.empty()) << how;
     const marrow::RunResult again = run_beside("");
     EXPECT_EQ(healthy(again), right) << how << ": nothing wrong is kept";
     for (std::size_t i = 0; i < right.size(); ++i)

@@ -52,7 +52,7 @@ TEST_F(RepetitionTest, CarriesFromItemToItem) {
   EXPECT_EQ(output(result).axis, "letter");
   EXPECT_EQ(output(result).names, (std::vector<std::string>{"x", "y", "z"}));
   EXPECT_EQ(numbers(output(result)), (std::vector<double>{101, 301, 601}));
-  EXPECT_EQ(number(result, 1), 601);
+  EXPECT_EQ(result_of(result, 1), 601);
   const NodeRecord& node = record(result, "r");
   ASSERT_TRUE(node.passes);
   EXPECT_EQ(node.passes->passes.size(), 3u);
@@ -106,10 +106,10 @@ TEST_F(RepetitionTest, ALoopEndsByItsRuleOrItsLimit) {
   EXPECT_EQ(numbers(output(result)), (std::vector<double>{6, 12, 24}));
   EXPECT_EQ(output(result).axis, "pass");
   EXPECT_EQ(output(result).names, (std::vector<std::string>{"1", "2", "3"}));
-  EXPECT_EQ(number(result, 1), 24);
+  EXPECT_EQ(result_of(result, 1), 24);
   EXPECT_EQ(record(result, "r").passes->end, "it is above 20");
   const RunResult shorter = run("  r:\n" + body + "    at_most: 2\n", "last: r.last_number");
-  EXPECT_EQ(number(shorter), 12);
+  EXPECT_EQ(result_of(shorter), 12);
   EXPECT_EQ(record(shorter, "r").passes->end, "there were 2 passes, which is the limit");
 }
 
@@ -133,7 +133,7 @@ outputs: {sum: sum}
   const RunResult result = run(nodes + ", if_pass_fails: go_on}\n", "all: r.sum, last: r.last_sum");
   EXPECT_FALSE(result.failed()) << messages;
   EXPECT_EQ(numbers(output(result)), (std::vector<double>{100, -1, -1}));
-  EXPECT_EQ(number(result, 1), 100);
+  EXPECT_EQ(result_of(result, 1), 100);
   EXPECT_EQ(record(result, "r").passes->passes[1].status, Status::failed);
 }
 
@@ -181,7 +181,7 @@ TEST_F(RepetitionTest, OnePassCarriesNothing) {
   EXPECT_EQ(messages, "");
   EXPECT_EQ(output(result).axis, "once");
   EXPECT_EQ(numbers(output(result)), (std::vector<double>{8}));
-  EXPECT_EQ(number(result, 1), 8);
+  EXPECT_EQ(result_of(result, 1), 8);
 }
 
 TEST_F(RepetitionTest, OnePassMayHoldALoop) {
@@ -196,10 +196,10 @@ TEST_F(RepetitionTest, OnePassMayHoldALoop) {
   EXPECT_EQ(messages, "");
   EXPECT_EQ(output(result).axis, "pass");
   EXPECT_EQ(numbers(output(result)), (std::vector<double>{3, 5, 7}));
-  EXPECT_EQ(number(result, 1), 7);
+  EXPECT_EQ(result_of(result, 1), 7);
   EXPECT_EQ(numbers(output(result, 2)), (std::vector<double>{5, 7, 9}));
   ASSERT_FALSE(output(result, 3).is_absent()) << "the loop makes all that the pass gives out";
-  EXPECT_EQ(number(result, 3), 9);
+  EXPECT_EQ(result_of(result, 3), 9);
   EXPECT_EQ(record(result, "o").passes->end, "there was one pass, which is the limit");
 }
 

@@ -80,7 +80,6 @@ class StoreTest : public run_fixture::RunTest {
     planning.store = &store;
     return marrow::plan_pipeline(pipeline, test_catalogue(), planning);
   }
-  double result_of(const marrow::RunResult& result, std::size_t index = 0) { return number(result, index); }
   static int calls(const marrow::RunResult& result) {
     int sum = 0;
     for (const auto& node : result.nodes) sum += node.calls;

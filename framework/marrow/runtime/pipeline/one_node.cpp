@@ -3,9 +3,8 @@
 
 #include "marrow/base/printable.hpp"
 #include "marrow/runtime/pipeline/given_value.hpp"
-#include "marrow/runtime/pipeline/pipeline_axes.hpp"
 #include "marrow/runtime/pipeline/pipeline_names.hpp"
-#include "marrow/runtime/pipeline/pipeline_options.hpp"
+#include "marrow/runtime/pipeline/pipeline_resolved.hpp"
 
 namespace marrow {
 namespace {

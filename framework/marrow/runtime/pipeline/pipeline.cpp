@@ -10,12 +10,9 @@
 #include "marrow/base/file_names.hpp"
 #include "marrow/base/printable.hpp"
 #include "marrow/runtime/node/types.hpp"
-#include "marrow/runtime/pipeline/pipeline_axes.hpp"
-#include "marrow/runtime/pipeline/pipeline_inputs.hpp"
+#include "marrow/runtime/pipeline/pipeline_layer.hpp"
 #include "marrow/runtime/pipeline/pipeline_names.hpp"
-#include "marrow/runtime/pipeline/pipeline_options.hpp"
-#include "marrow/runtime/pipeline/pipeline_references.hpp"
-#include "marrow/runtime/pipeline/pipeline_repetition.hpp"
+#include "marrow/runtime/pipeline/pipeline_resolved.hpp"
 #include "marrow/runtime/plugins/contract.hpp"
 
 namespace marrow {

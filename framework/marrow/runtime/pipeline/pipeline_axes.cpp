@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "marrow/runtime/pipeline/pipeline_axes.hpp"
+#include "marrow/runtime/pipeline/pipeline_resolved.hpp"
 
 #include <algorithm>
 
 #include "marrow/base/printable.hpp"
 #include "marrow/runtime/pipeline/may_fail.hpp"
 #include "marrow/runtime/pipeline/pipeline_names.hpp"
-#include "marrow/runtime/pipeline/pipeline_repetition.hpp"
 
 namespace marrow {
 namespace {

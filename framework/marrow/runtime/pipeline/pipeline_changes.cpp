@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 // Changes of a pipeline after its nodes are read: overrides of the command line, and `set` in files.
-#include "marrow/runtime/pipeline/pipeline_changes.hpp"
+#include "marrow/runtime/pipeline/pipeline_layer.hpp"
 
 #include <algorithm>
 
 #include "marrow/base/printable.hpp"
 #include "marrow/runtime/pipeline/given_value.hpp"
-#include "marrow/runtime/pipeline/pipeline_inputs.hpp"
 #include "marrow/runtime/pipeline/pipeline_names.hpp"
 
 namespace marrow {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The inputs that a pipeline declares, and their values.
-#include "marrow/runtime/pipeline/pipeline_inputs.hpp"
+#include "marrow/runtime/pipeline/pipeline_layer.hpp"
 
 #include <algorithm>
 

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
+// What is read from the files of a pipeline, one over the other, before nodes are looked up.
 #include "marrow/runtime/pipeline/pipeline_text.hpp"
 
 namespace marrow {
@@ -36,5 +37,32 @@ std::string may_fail_of(const std::string& node);
 
 /// Whether a node uses a pipeline file, not a node of a plugin.
 bool is_part(const std::string& uses);
+
+/// Puts what a file declares under `inputs` over what the files below declare.
+void put_inputs_over(DeclaredInputs& inputs, const YamlEntry& section, const PipelineLayer& layer,
+                     const Catalogue& catalogue);
+
+/// Gives the inputs their values: given ones, else the defaults. Checks them.
+void set_inputs(DeclaredInputs& inputs, const PipelineReading& reading, Diagnostics& diagnostics);
+
+/// What the file declares, for those who use the pipeline.
+std::vector<PipelineInput> listed_inputs(const DeclaredInputs& inputs);
+
+/// Where a relative path in a value of an input or in an override starts: the folder of the file that it is written in,
+/// else the working folder.
+std::filesystem::path folder_of(const Place& written);
+
+/// The entries of `set` in a file.
+std::vector<WrittenEntry> changes_in(const YamlEntry& section, const PipelineLayer& layer);
+
+/// Changes the pipeline. `layer`: the number of the changes' layer; those of a later layer of their own come after it.
+/// Options that an override makes useless are worth a note.
+void apply_changes(WrittenPipeline& pipeline, std::vector<WrittenEntry> changes, int layer, Diagnostics& diagnostics);
+
+/// Replaces each node that uses a pipeline file by the nodes of that file, called NODE/ITS NODE. Its inputs of data are
+/// replaced by what the node is wired to, and what names the node by what makes its outputs. If the pipeline is itself
+/// a part that is checked alone, nodes stand for its inputs.
+void put_parts_in(WrittenPipeline& pipeline, const PipelineReading& reading, const Catalogue& catalogue,
+                  Diagnostics& diagnostics);
 
 }  // namespace marrow

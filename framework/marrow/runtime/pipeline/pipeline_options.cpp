@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The values of a node's options, the relations between them, and options that have no effect.
-#include "marrow/runtime/pipeline/pipeline_options.hpp"
+#include "marrow/runtime/pipeline/pipeline_resolved.hpp"
 
 #include <algorithm>
 

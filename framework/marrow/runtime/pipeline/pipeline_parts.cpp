@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Parts: nodes that are pipelines. A run does not know them, because the nodes of their files take their place.
-#include "marrow/runtime/pipeline/pipeline_parts.hpp"
+#include "marrow/runtime/pipeline/pipeline_layer.hpp"
 
 #include <algorithm>
 #include <functional>
@@ -10,9 +10,8 @@
 #include "marrow/base/printable.hpp"
 #include "marrow/runtime/pipeline/extended_file.hpp"
 #include "marrow/runtime/pipeline/input_texts.hpp"
-#include "marrow/runtime/pipeline/pipeline_inputs.hpp"
 #include "marrow/runtime/pipeline/pipeline_names.hpp"
-#include "marrow/runtime/pipeline/pipeline_references.hpp"
+#include "marrow/runtime/pipeline/pipeline_resolved.hpp"
 
 namespace marrow {
 namespace {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "marrow/runtime/pipeline/pipeline_references.hpp"
+#include "marrow/runtime/pipeline/pipeline_resolved.hpp"
 
 #include <algorithm>
 #include <sstream>

@@ -1,13 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 // Nodes with a body: the values that the body is given, those that a pass carries to the next, and the outputs.
-#include "marrow/runtime/pipeline/pipeline_repetition.hpp"
+#include "marrow/runtime/pipeline/pipeline_resolved.hpp"
 
 #include <algorithm>
 
 #include "marrow/base/printable.hpp"
 #include "marrow/runtime/node/types.hpp"
 #include "marrow/runtime/pipeline/pipeline_names.hpp"
-#include "marrow/runtime/pipeline/pipeline_references.hpp"
 
 namespace marrow {
 namespace {

@@ -8,10 +8,8 @@
 #include "marrow/base/number_text.hpp"
 #include "marrow/base/printable.hpp"
 #include "marrow/runtime/pipeline/extended_file.hpp"
-#include "marrow/runtime/pipeline/pipeline_changes.hpp"
-#include "marrow/runtime/pipeline/pipeline_inputs.hpp"
+#include "marrow/runtime/pipeline/pipeline_layer.hpp"
 #include "marrow/runtime/pipeline/pipeline_names.hpp"
-#include "marrow/runtime/pipeline/pipeline_parts.hpp"
 
 namespace marrow {
 namespace {

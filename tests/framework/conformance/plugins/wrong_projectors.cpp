@@ -58,9 +58,8 @@ class Radiograph : public RadiographProjector {
   template <class Pixels>
   std::vector<float> changed(const Camera& camera, const RigidTransform& pose, const Pixels& pixels) const {
     std::vector<float> values = right_->radiograph(camera, pose, pixels);
-    if (fault == "dense")
-      for (float& value : values) value *= 1.05f;
-    if (fault == "changing" && !values.empty()) values[values.size() / 2] *= 1 + 0.001f * float(wrong::next_call());
+    if (fault == "dense" || fault == "changing")
+      for (float& value : values) value *= fault == "dense" ? 1.05f : 1 + 0.001f * float(wrong::next_call() % 7);
     if (fault == "behind") {  // what lies behind the source, mirrored
       Camera back = camera;
       back.camera_from_world.rotation.bottomRows<2>() *= -1;
