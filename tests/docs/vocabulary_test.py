@@ -68,9 +68,10 @@ class Vocabulary(Case):
         rows = own_names.own_names_part(self.nodes).splitlines()
         (row,) = [row for row in rows if row.startswith("| [`guide.target`]")]
         self.assertEqual(row, "| [`guide.target`](../nodes/guide.target.md) |  | `max_residual_px` (number, px) |")
-        told = "\n".join(rows)
-        for name in {**self.table.ports, **self.table.options}:
-            self.assertNotIn("`%s` (" % name, told)
+        for of_node, shared in ((own_names.ports_of, self.table.ports), (own_names.options_of, self.table.options)):
+            names = {one[0] for node in self.nodes.values() for one in of_node(node)}
+            own = [one[0] for ones in own_names.own_names(self.nodes, of_node).values() for one in ones]
+            self.assertEqual(set(own), names - set(shared))
 
 
 if __name__ == "__main__":

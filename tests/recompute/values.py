@@ -10,7 +10,7 @@ import yaml
 
 from camera import Camera, transform_of
 from pictures import read_grey
-from rigid import Frame, Transform, in_other_frame
+from rigid import Frame, Transform
 
 
 class Loader(getattr(yaml, "CSafeLoader", yaml.SafeLoader)):
@@ -34,10 +34,6 @@ class Pose:
     covariance: np.ndarray  # None: nothing is predicted
     warnings: list
     deviations: list  # as the file prints them, degrees and mm; empty if it does not
-
-    def covariance_in(self, frame):
-        """None if there is none, or if a direction is not determined at all."""
-        return None if self.covariance is None else in_other_frame(self.covariance, self.frame, frame)
 
 
 def read_pose(path):

@@ -18,7 +18,6 @@ constexpr int kWidth = 200, kHeight = 170, kMargin_px = 400;  // so wide that th
 struct Images {
   std::vector<double> seen, rendered;
   double seen_at(int u, int v) const { return seen[std::size_t(v * kWidth + u)]; }
-  double rendered_at(int u, int v) const { return rendered[std::size_t(v * kWidth + u)]; }
 };
 
 marrow::View view() { return blob_scene::view_of(50000, 0.02, 60); }

@@ -99,12 +99,6 @@ class Extends(Case):
         said = "none.yaml: error: the file of settings cannot be read"
         self.refused(said, "run", "whole.yaml", "--set-file", "none.yaml")
 
-    def test_a_file_that_has_moved(self):
-        self.write("old.yaml", "{marrow: 1, extends: base.yaml, moved: true}\n")
-        told = self.expect(0, "run", "old.yaml", "--out", "run")
-        said = "old.yaml has moved to base.yaml; its old name will go with the next release"
-        self.assertIn(said, told.stdout + told.stderr)
-
     def test_an_experiment_that_extends(self):
         self.write("e.yaml", EXPERIMENT)
         self.write("f.yaml", EXTENDING)
