@@ -58,15 +58,32 @@ class FitVerdict(unittest.TestCase):
     def tearDownClass(cls):
         cls.temporary.cleanup()
 
-    def run_tool(self, *arguments):
-        return subprocess.run(
-            [str(SOURCE / "tools/studies/fit_verdict"), *map(str, arguments)], capture_output=True, text=True
-        )
+    def run_tool(self, *arguments, said=None):
+        """What it prints, or, if something is `said`, how it refuses."""
+        command = [str(SOURCE / "tools/studies/fit_verdict"), *map(str, arguments)]
+        done = subprocess.run(command, capture_output=True, text=True)
+        if said is None:
+            self.assertEqual(done.returncode, 0, done.stderr)
+            return done.stdout
+        self.assertEqual((done.returncode, done.stderr), (1, "fit_verdict: %s\n" % said))
+
+    def model(self, name, **more):
+        """The file of a model whose log odds are those of the bias and log(1 + doubt)."""
+        terms = [{"figure": "doubt", "scale": 1, "weight": 1, "absent": 0}]
+        model = {"record": "", "bias": -1, "doubtful_above": 0.5, "wrong_above": 0.9, "terms": terms, **more}
+        path = self.folder / (name + ".yaml")
+        path.write_text(yaml.safe_dump(model))
+        return path
+
+    def counts(self, folder, model, *more):
+        """Failed, trusted, right, not trusted, between, not trusted: of all poses."""
+        printed = self.run_tool("--check", folder, "--model", model, *more)
+        last = next(line for line in printed.splitlines() if line.startswith("all "))
+        return [int(word) for word in last.split()[1:]]
 
     def test_fits_what_the_poses_were_drawn_from(self):
         model_file = self.folder / "model.yaml"
-        done = self.run_tool(self.folder / "seen", "--write", model_file, "--ridge", "1e-6", "--record", "Drawn here.")
-        self.assertEqual(done.returncode, 0, done.stderr)
+        self.run_tool(self.folder / "seen", "--write", model_file, "--ridge", "1e-6", "--record", "Drawn here.")
         model = yaml.safe_load(model_file.read_text())
         self.assertIn("800 poses", model["record"])
         self.assertTrue(model["record"].endswith("from: seen. Drawn here."), model["record"])
@@ -79,21 +96,6 @@ class FitVerdict(unittest.TestCase):
         self.assertTrue(all(term["weight"] >= 0 for term in model["terms"]))
 
     def test_counts_what_a_model_is_worth(self):
-        model_file = self.folder / "by_hand.yaml"
-        model_file.write_text(
-            yaml.safe_dump(
-                {
-                    "marrow-failure-model": 1,
-                    "record": "",
-                    "bias": -1,
-                    "doubtful_above": 0.5,
-                    "wrong_above": 0.9,
-                    "terms": [{"figure": "doubt", "scale": 1, "weight": 1, "absent": 0}],
-                }
-            )
-        )
-        done = self.run_tool("--check", self.folder / "unseen", "--model", model_file, "--roc", self.folder / "roc.svg")
-        self.assertEqual(done.returncode, 0, done.stderr)
         # Probability 0.5 is at a doubt of e - 1.
         bad, good, silent, alarms = 0, 0, 0, 0
         for row in map(json.loads, (self.folder / "unseen/cells.jsonl").read_text().splitlines()):
@@ -103,9 +105,8 @@ class FitVerdict(unittest.TestCase):
             failed = row["errors.distal.final.mtre_mm"] > 2 or row["errors.distal.final.axial_deg"] < -5
             bad, good = bad + failed, good + (not failed)
             silent, alarms = silent + (failed and doubt <= math.e - 1), alarms + (not failed and doubt > math.e - 1)
-        last = next(line for line in done.stdout.splitlines() if line.startswith("all "))
-        self.assertEqual([int(word) for word in last.split()[1:]], [bad, silent, good, alarms, 1, 1])
-        self.assertTrue((self.folder / "roc.svg").read_text().startswith("<svg"))
+        counts = self.counts(self.folder / "unseen", self.model("by_hand", **{"marrow-failure-model": 1}))
+        self.assertEqual(counts, [bad, silent, good, alarms, 1, 1])
 
     def threshold(self, name, right, failed, *arguments, wrong_above=0.9):
         """The threshold that is chosen for poses with these log odds."""
@@ -115,15 +116,12 @@ class FitVerdict(unittest.TestCase):
             folder,
             [row_of("v/%d/0" % i, [mm, 0], {"doubt": math.expm1(odds + 5)}) for i, (odds, mm) in enumerate(errors)],
         )
-        model_file = folder / "model.yaml"
-        terms = [{"figure": "doubt", "scale": 1, "weight": 1, "absent": 0}]
-        before = {"record": "Before", "bias": -5, "doubtful_above": 0.5, "wrong_above": wrong_above, "terms": terms}
-        model_file.write_text(yaml.safe_dump(before))
-        done = self.run_tool("--threshold", folder, "--model", model_file, "--record", "And after.", *arguments)
-        self.assertEqual(done.returncode, 0, done.stderr)
+        model_file = self.model(name, record="Before", bias=-5, wrong_above=wrong_above)
+        terms = yaml.safe_load(model_file.read_text())["terms"]
+        printed = self.run_tool("--threshold", folder, "--model", model_file, "--record", "And after.", *arguments)
         model = yaml.safe_load(model_file.read_text())
         self.assertEqual((model["record"], model["terms"]), ("Before. And after.", terms))
-        self.assertIn("doubtful_above: %s, before 0.5" % model["doubtful_above"], done.stdout)
+        self.assertIn("doubtful_above: %s, before 0.5" % model["doubtful_above"], printed)
         return model["doubtful_above"]
 
     def test_the_threshold_of_doubt_is_what_the_allowed_share_of_right_poses_exceeds(self):
@@ -153,8 +151,7 @@ class FitVerdict(unittest.TestCase):
         rows += [row_of("v/f%d/0" % i, [3, 0], {"doubt": 1.1 + i / 7, "more": 3 + i / 3}) for i in range(20)]
         write_rows(self.folder / "alike", rows)
         model_file = self.folder / "alike.yaml"
-        done = self.run_tool(self.folder / "alike", "--write", model_file, "--false-alarms", "0")
-        self.assertEqual(done.returncode, 0, done.stderr)
+        self.run_tool(self.folder / "alike", "--write", model_file, "--false-alarms", "0")
         model = yaml.safe_load(model_file.read_text())
         figures = {"doubt": 0.123456789, "more": 0.987654321}
         log_odds = model["bias"] + sum(
@@ -170,28 +167,17 @@ class FitVerdict(unittest.TestCase):
             outputs = self.folder / ("mixed/cells/v/%d/0/outputs/verdict" % i)
             outputs.mkdir(parents=True)
             (outputs / "distal.yaml").write_text(yaml.safe_dump({"figures": [{"name": "doubt", "value": 1e6}]}))
-        model_file = self.folder / "one_term.yaml"
-        terms = [{"figure": "doubt", "scale": 1, "weight": 1, "absent": 0}]
-        model = {"record": "", "bias": -1, "doubtful_above": 0.5, "wrong_above": 0.9, "terms": terms}
-        model_file.write_text(yaml.safe_dump(model))
-        done = self.run_tool("--check", self.folder / "mixed", "--model", model_file)
-        last = next(line for line in done.stdout.splitlines() if line.startswith("all "))
         # log odds are -1 + log 2 < 0 and -1: none is doubtful, so all ten failures are trusted
-        self.assertEqual([int(word) for word in last.split()[1:]], [10, 10, 10, 0, 0, 0])
+        self.assertEqual(self.counts(self.folder / "mixed", self.model("one_term")), [10, 10, 10, 0, 0, 0])
 
     def test_a_verdict_that_is_one_file(self):
         rows = [row_of("v/%d/0" % i, [0.5, 0], {}) for i in range(4)]
         for row in rows:
             row["verdict_figures"] = {"verdict": {"doubt": 1}, "other.distal": {"doubt": 2}}
         write_rows(self.folder / "single", rows)
-        model_file = self.folder / "single.yaml"
-        terms = [{"figure": "doubt", "scale": 1, "weight": 1, "absent": 0}]
-        model = {"record": "", "bias": -1, "doubtful_above": 0.5, "wrong_above": 0.9, "terms": terms}
-        model_file.write_text(yaml.safe_dump(model))
         for arguments in ([], ["--verdict", "other"], ["--verdict", "other.distal"]):
-            done = self.run_tool("--check", self.folder / "single", "--model", model_file, *arguments)
-            last = next(line for line in done.stdout.splitlines() if line.startswith("all "))
-            self.assertEqual(last.split()[3:5], ["4", "4" if arguments else "0"], done.stdout)
+            counts = self.counts(self.folder / "single", self.model("single"), *arguments)
+            self.assertEqual(counts[2:4], [4, 4 if arguments else 0])
 
     def test_what_cannot_be_told_apart_is_refused(self):
         row = row_of("v/1/0", [0.5, 0], {"doubt": 1})
@@ -204,18 +190,14 @@ class FitVerdict(unittest.TestCase):
             ("other", other, "the metrics lack errors.distal.final.axial_deg; see --errors"),
         ):
             write_rows(self.folder / name, [one])
-            done = self.run_tool(self.folder / name)
-            self.assertEqual(done.returncode, 1)
-            self.assertEqual(done.stderr, "fit_verdict: %s: %s\n" % (self.folder / name / "cells.jsonl", sentence))
-        done = self.run_tool(self.folder / "seen", self.folder / "seen/../seen")
-        self.assertIn("seen/../seen is given twice, so its poses would count twice", done.stderr)
-        done = self.run_tool(self.folder / "nowhere")
-        self.assertIn("nowhere/cells.jsonl; give folders of marrow compare", done.stderr)
-
-    def test_says_what_is_missing(self):
-        done = self.run_tool(self.folder / "seen", "--verdict", "other")
-        self.assertNotEqual(done.returncode, 0)
-        self.assertIn("no cell with a verdict; give folders of marrow compare", done.stderr)
+            self.run_tool(self.folder / name, said="%s: %s" % (self.folder / name / "cells.jsonl", sentence))
+        twice, nowhere = self.folder / "seen/../seen", self.folder / "nowhere"
+        for folders, sentence in (
+            ([self.folder / "seen", twice], "%s is given twice, so its poses would count twice" % twice),
+            ([nowhere], "there is no %s/cells.jsonl; give folders of marrow compare" % nowhere),
+            ([self.folder / "seen", "--verdict", "other"], "no cell with a verdict; give folders of marrow compare"),
+        ):
+            self.run_tool(*folders, said=sentence)
 
 
 if __name__ == "__main__":
