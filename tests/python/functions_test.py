@@ -5,21 +5,10 @@ import threading
 import time
 
 import numpy
+from function_nodes import NEAR
 from harness.package import interrupt, main, marrow, small_case
 from written_nodes import Written, camera, view
 
-SLOW = """import time
-
-@marrow.cost("similarity.slow", summary="takes a while for each batch")
-def slow(views: Annotated[marrow.Items[marrow.View], marrow.over("view")], *, fails: Annotated[bool, "fails"] = False):
-    def costs(poses):
-        if fails:
-            raise marrow.Error("the views are too dark")
-        time.sleep(0.1)
-        return numpy.zeros(len(poses))
-
-    return costs
-"""
 _made = {}
 
 
@@ -95,16 +84,16 @@ class Costs(Written):
         self.assertEqual(len(marrow.evaluate.landscape(cost, marrow.Pose(numpy.eye(4)), profile_points=3).profiles), 6)
 
     def test_errors_and_ctrl_c_of_a_cost(self):
-        self.plugin(SLOW)
-        with self.assertRaisesRegex(marrow.Error, "the views are too dark"):
-            marrow.similarity.slow([view()], fails=True)(numpy.eye(4))
-        cost = marrow.similarity.slow([view()])
+        self.plugin(NEAR)
+        with self.assertRaisesRegex(marrow.Error, "the bowl is broken; take another one"):
+            marrow.similarity.near(does="raise")(numpy.eye(4))
+        cost = marrow.similarity.near(does="tenth")
         poses = numpy.tile(numpy.eye(4), (32000, 1, 1))  # would take 200 s
         interrupt(self, lambda: cost(poses))
 
     def test_other_threads_go_on_while_a_cost_is_computed(self):
-        self.plugin(SLOW)
-        cost = marrow.similarity.slow([view()])
+        self.plugin(NEAR)
+        cost = marrow.similarity.near(does="tenth")
         ended = threading.Event()
         thread = threading.Thread(target=lambda: (cost(numpy.tile(numpy.eye(4), (320, 1, 1))), ended.set()))
         thread.start()

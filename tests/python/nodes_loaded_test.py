@@ -4,7 +4,6 @@
 The right value of each case is what plain Python gives: the module that its import rules find first. Each case writes
 the number that it expects into that module.
 """
-import contextlib
 import os
 import pathlib
 import subprocess
@@ -14,41 +13,47 @@ import zipfile
 from harness.package import main
 from written_nodes import Written
 
-NODE = """
-%s
-@marrow.node("own.value", summary="a value")
-def value(view: Annotated[marrow.View, "view"]) -> Annotated[marrow.Metrics, marrow.named("figures")]:
-%s
-    return marrow.Metrics({"value": VALUE})
-"""
 OPTIONAL = "try:\n    from fast import VALUE\nexcept ImportError:\n    VALUE = 500\n"
+DURING = "import importlib\n" + OPTIONAL.replace(
+    "from fast import VALUE", "VALUE = importlib.import_module('fa' + 'st').VALUE"
+)
+VERSION = "import importlib.metadata, pictures\nVALUE = float(importlib.metadata.version('%s'))"
+FIVE = "VALUE = 5\n"
+# What a node imports, and then in turn: files that appear or, with None, go (places in the test's folder), and values
+# that are then right.
+FILES = {
+    "a part of a package that appears": (
+        OPTIONAL.replace("fast", "parts.fast"),
+        *(("plugins/parts/__init__.py", ""), 500, ("plugins/parts/fast.py", FIVE), 5),
+    ),
+    "a folder that becomes a package": (
+        "import portion.part\nVALUE = getattr(portion, 'VALUE', 500)",
+        *(("plugins/portion/part.py", ""), 500, ("plugins/portion/__init__.py", FIVE), 5),
+    ),
+    "a module that shadows one of the standard library": (
+        "import colorsys\nVALUE = getattr(colorsys, 'VALUE', 1)",
+        *(1, ("plugins/colorsys.py", FIVE), 5),
+    ),
+    "on the search path, an optional module that appears": (OPTIONAL, 500, ("path/fast.py", FIVE), 5),
+    "on the search path, a module that shadows another, and a package that comes before a module": (
+        "from helper import VALUE",
+        *(("second/helper.py", FIVE), 5, ("path/helper.py", "VALUE = 4\n"), 4),
+        *(("plugins/helper.py", "VALUE = 6\n"), 6, ("plugins/helper/__init__.py", "VALUE = 7\n"), 7),
+    ),
+    "on the search path, what runs at the start of the interpreter": (
+        "import builtins\nVALUE = getattr(builtins, 'VALUE', 1)",
+        *(1, ("path/usercustomize.py", "import builtins\nbuiltins.VALUE = 2\n")),
+        2 if not sys.flags.no_user_site else 1,
+    ),
+    "an installed module that is edited": (
+        "from helper.inner import VALUE",
+        *(("site-packages/helper/__init__.py", ""), ("site-packages/helper/inner.py", "VALUE = 1\n"), 1),
+        *(("site-packages/helper/inner.py", "VALUE = 2\n"), 2),
+    ),
+}
 
 
 class Loaded(Written):
-    def node(self, at_import="", in_call=""):
-        """A node that gives VALUE, which the code at the import of its file or in its call sets."""
-        return self.plugin(NODE % (at_import, "".join("    %s\n" % line for line in in_call.splitlines())))
-
-    def module(self, place, text):
-        file = self.scratch / place
-        file.parent.mkdir(parents=True, exist_ok=True)
-        file.write_text(text)
-        return file
-
-    @contextlib.contextmanager
-    def environment(self, **variables):
-        """These variables, of which None is not set, for this process and those that it starts."""
-        before = dict(os.environ)
-        for name, text in variables.items():
-            os.environ.pop(name, None)
-            if text is not None:
-                os.environ[name] = str(text)
-        try:
-            yield
-        finally:
-            os.environ.clear()
-            os.environ.update(before)
-
     def kept(self, value):
         """Runs until the result is kept, which it is once everything that it depends on is known."""
         for _ in range(3):
@@ -67,31 +72,27 @@ class Loaded(Written):
         module.unlink()
         self.kept(500)
 
+    def test_files_that_appear_or_change(self):
+        for name, (code, *steps) in FILES.items():
+            with self.subTest(name):
+                self.setUp()  # each has a folder of its own
+                path = ":".join(str(self.scratch / folder) for folder in ("path", "second", "site-packages"))
+                with self.environment(PYTHONPATH=path):
+                    self.node(code)
+                    for step in steps:
+                        if isinstance(step, tuple):
+                            self.module(*step)
+                        else:
+                            self.kept(step)
+
     def test_an_optional_module_that_appears_during_later_calls(self):
-        for name, code in (
-            ("named in the text", OPTIONAL),
-            ("named during the call", "import importlib\n" + OPTIONAL.replace("from fast import VALUE", DURING)),
-        ):
+        for name, code in (("named in the text", OPTIONAL), ("named during the call", DURING)):
             with self.subTest(name):
                 self.node(in_call=code)
                 self.kept(500)
                 module = self.module("plugins/fast.py", "VALUE = 5\n")
                 self.kept(5)
                 module.unlink()
-
-    def test_an_optional_module_that_appears_on_the_search_path(self):
-        with self.environment(PYTHONPATH=self.scratch / "later"):
-            self.node(OPTIONAL)
-            self.kept(500)
-            self.module("later/fast.py", "VALUE = 5\n")
-            self.kept(5)
-
-    def test_a_part_of_a_package_that_appears(self):
-        self.module("plugins/parts/__init__.py", "")
-        self.node(OPTIONAL.replace("fast", "parts.fast"))
-        self.kept(500)
-        self.module("plugins/parts/fast.py", "VALUE = 5\n")
-        self.kept(5)
 
     def test_a_module_in_an_archive(self):
         for value in (1, 2):
@@ -101,31 +102,6 @@ class Loaded(Written):
                 if value == 1:
                     self.node("from packed import VALUE")
                 self.kept(value)
-
-    def test_a_folder_that_becomes_a_package(self):
-        self.module("plugins/portion/part.py", "")
-        self.node("import portion.part\nVALUE = getattr(portion, 'VALUE', 500)")
-        self.kept(500)
-        self.module("plugins/portion/__init__.py", "VALUE = 5\n")
-        self.kept(5)
-
-    def test_a_module_that_shadows_another(self):
-        self.module("second/helper.py", "VALUE = 3\n")
-        with self.environment(PYTHONPATH="%s:%s" % (self.scratch / "first", self.scratch / "second")):
-            self.node("from helper import VALUE")
-            self.kept(3)
-            self.module("first/helper.py", "VALUE = 4\n")
-            self.kept(4)
-            self.module("plugins/helper.py", "VALUE = 6\n")
-            self.kept(6)
-            self.module("plugins/helper/__init__.py", "VALUE = 7\n")  # a package comes before a module
-            self.kept(7)
-
-    def test_a_module_that_shadows_one_of_the_standard_library(self):
-        self.node("import colorsys\nVALUE = getattr(colorsys, 'VALUE', 1)")
-        self.kept(1)
-        self.module("plugins/colorsys.py", "VALUE = 2\n")
-        self.kept(2)
 
     def test_a_link_that_leads_elsewhere(self):
         self.module("one.py", "VALUE = 1\n")
@@ -172,13 +148,6 @@ class Loaded(Written):
             self.kept(2)
         self.kept(1)
 
-    def test_what_runs_at_the_start_of_the_interpreter(self):
-        with self.environment(PYTHONPATH=self.scratch / "path"):
-            self.node("import builtins\nVALUE = getattr(builtins, 'VALUE', 1)")
-            self.kept(1)
-            self.module("path/usercustomize.py", "import builtins\nbuiltins.VALUE = 2\n")
-            self.kept(2 if not sys.flags.no_user_site else 1)
-
     def test_another_interpreter(self):
         self.node("import sys\nVALUE = len(sys.executable)")
         for name in ("python", "python-of-another-name"):
@@ -204,15 +173,6 @@ class Loaded(Written):
                 self.kept(9.4)
                 told.write_text("Name: Cushion\nVersion: 9.5\n")
                 self.kept(9.5)
-
-    def test_an_installed_module_that_is_edited(self):
-        with self.environment(PYTHONPATH=self.scratch / "site-packages"):
-            module = self.module("site-packages/helper/inner.py", "VALUE = 1\n")
-            self.module("site-packages/helper/__init__.py", "")
-            self.node("from helper.inner import VALUE")
-            self.kept(1)
-            module.write_text("VALUE = 2\n")
-            self.kept(2)
 
     def test_bytecode_of_the_search_path_is_not_trusted(self):
         import py_compile
@@ -246,9 +206,6 @@ class Loaded(Written):
             (folder / "helper.py").write_text("VALUE = 2\n")
             self.kept(2)
 
-
-DURING = "VALUE = importlib.import_module('fa' + 'st').VALUE"
-VERSION = "import importlib.metadata, pictures\nVALUE = float(importlib.metadata.version('%s'))"
 
 if __name__ == "__main__":
     main()
