@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Nodes written in Python that make functions or take them: costs, optimizers, projectors, and decorators of them. Their
-values are known by hand; `does` says what else they do."""
+"""Nodes written in Python that make functions or take them: costs, optimizers, projectors, and decorators of them.
+Their values are known by hand; `does` says what else they do."""
 from written_nodes import Written
 
 NEAR = """

@@ -59,8 +59,8 @@ class Costs(FunctionNodes):
             self.assertLess(max(profile.costs.max() for profile in profiles), 1e4, "1e6 for each further one")
 
     def test_what_is_wrong_with_its_inputs_is_said_when_it_is_made(self):
-        with self.assertRaisesRegex(marrow.RunError, "the views show no bone; take others"):
-            marrow.similarity.near([view()], does="refuse")
+        refusing = lambda: marrow.similarity.near([view()], does="refuse")
+        self.refuses(("the views show no bone; take others", refusing), kind=marrow.RunError)
 
     def test_an_optimizer_in_cpp_finds_the_least(self):
         found = marrow.register.multiresolution(
@@ -74,8 +74,7 @@ class Costs(FunctionNodes):
             ("none", "similarity.near: a cost is not finite; give the worst value where nothing can be compared"),
             ("divide", "near.py, line [0-9]+, in costs: ZeroDivisionError: division by zero"),
         ):
-            with self.subTest(does), self.assertRaisesRegex(marrow.RunError, text):
-                self.profiles(does=does)
+            self.refuses((text, lambda: self.profiles(does=does)), kind=marrow.RunError)
 
 
 class Decorators(FunctionNodes):
@@ -145,8 +144,7 @@ class Decorators(FunctionNodes):
             ("squares", "few", "^similarity.line: expected 2 costs, got 1"),
             ("squares", "sleep", r"^costs.py took longer than 4 s, and .* give it more in @marrow.cost\(..., seconds"),
         ):
-            with self.subTest(inner=inner, outer=outer), self.assertRaisesRegex(marrow.Error, text):
-                self.value(inner, outer)
+            self.refuses((text, lambda: self.value(inner, outer)))
         self.assertEqual(self.value(), [27, 27], "the next call works")
 
     def test_the_time_of_the_function_inside_does_not_count(self):
@@ -265,14 +263,12 @@ class Projectors(Written):
             ("below", "project.ball: a value of the radiograph is below 0 or not finite; give 0 where the model is"),
             ("not finite", "project.ball: a value of the radiograph is below 0 or not finite"),
         ):
-            with self.subTest(does), self.assertRaisesRegex(marrow.Error, text):
-                marrow.project.ball(does=does)(camera(), numpy.eye(4))
+            self.refuses((text, lambda: marrow.project.ball(does=does)(camera(), numpy.eye(4))))
         for does, text in (
             ("no box", "project.ball: expected a function that draws, and the corners of a box about the model"),
             ("flat box", r"the corners of the box must be an array \[N, 3\] of finite numbers, in mm"),
         ):
-            with self.subTest(does), self.assertRaisesRegex(marrow.RunError, text):
-                marrow.project.ball(does=does)
+            self.refuses((text, lambda: marrow.project.ball(does=does)), kind=marrow.RunError)
 
 
 if __name__ == "__main__":

@@ -51,9 +51,8 @@ class Trust(Written):
 
     def test_an_import_in_a_call(self):
         self.node(THEIRS % str(self.open), "import theirs\nVALUE = 5")
-        with self.assertRaises(marrow.RunError) as caught:
-            marrow.own.value(view())
-        self.assertIn("module 'theirs' " + self.untrusted(self.open / "theirs.py"), str(caught.exception))
+        said = str(self.fault_of(lambda: marrow.own.value(view()), marrow.RunError))
+        self.assertIn("module 'theirs' " + self.untrusted(self.open / "theirs.py"), said)
         self.assertFalse(self.mark.exists())
 
     def test_a_folder_of_the_search_path(self):

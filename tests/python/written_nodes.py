@@ -6,7 +6,7 @@ import pathlib
 import subprocess
 
 import numpy
-from harness.package import MARROW, SCRATCH, TEST_PLUGINS, Case, marrow
+from harness.package import MARROW, SCRATCH, TEST_PLUGINS, Refusing, marrow
 
 HEAD = """from typing import Annotated, NamedTuple, Optional
 import marrow
@@ -49,7 +49,7 @@ def processes(file):
     return found
 
 
-class Written(Case):
+class Written(Refusing):
     """Each test has its own folder of plugins and cache of descriptions."""
 
     def setUp(self):
