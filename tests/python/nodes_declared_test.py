@@ -180,7 +180,7 @@ def own(view: marrow.View, *, low: Annotated[float, "low"] = 3) -> marrow.EdgeMa
                 "of the version for which the package was built",
             ),
         ):
-            with self.environment(MARROW_PYTHON=interpreter):
+            with self.with_variables(MARROW_PYTHON=interpreter):
                 self.assertRegex(self.program("doctor", code=1), text)
 
     def test_a_file_that_never_ends_is_described_once(self):

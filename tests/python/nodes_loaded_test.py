@@ -77,7 +77,7 @@ class Loaded(Written):
             with self.subTest(name):
                 self.setUp()  # each has a folder of its own
                 path = ":".join(str(self.scratch / folder) for folder in ("path", "second", "site-packages"))
-                with self.environment(PYTHONPATH=path):
+                with self.with_variables(PYTHONPATH=path):
                     self.node(code)
                     for step in steps:
                         if isinstance(step, tuple):
@@ -98,7 +98,7 @@ class Loaded(Written):
         for value in (1, 2):
             with zipfile.ZipFile(self.scratch / "l.zip", "w") as archive:
                 archive.writestr("packed.py", "VALUE = %d\n" % value)
-            with self.environment(PYTHONPATH=self.scratch / "l.zip"):
+            with self.with_variables(PYTHONPATH=self.scratch / "l.zip"):
                 if value == 1:
                     self.node("from packed import VALUE")
                 self.kept(value)
@@ -118,7 +118,7 @@ class Loaded(Written):
         self.node("from helper import VALUE")
         here = os.getcwd()
         try:
-            with self.environment(PYTHONPATH="modules"):
+            with self.with_variables(PYTHONPATH="modules"):
                 for value in (1, 2):
                     self.module("work%d/modules/helper.py" % value, "VALUE = %d\n" % value)
                     os.chdir(self.scratch / ("work%d" % value))
@@ -129,12 +129,12 @@ class Loaded(Written):
     def test_folders_of_the_user(self):
         version = "python%d.%d" % sys.version_info[:2]
         site = "user/lib/%s/site-packages" % version
-        with self.environment(PYTHONUSERBASE=self.scratch / "user", PYTHONNOUSERSITE=None):
+        with self.with_variables(PYTHONUSERBASE=self.scratch / "user", PYTHONNOUSERSITE=None):
             self.node(OPTIONAL)
             self.kept(500)
             self.module(site + "/fast.py", "VALUE = 5\n")  # the folder was not there before
             self.kept(5)
-            with self.environment(PYTHONNOUSERSITE="1"):
+            with self.with_variables(PYTHONNOUSERSITE="1"):
                 self.kept(500)
             self.kept(5)
             self.module(site + "/more.pth", "import sys; sys.path.insert(0, %r)\n" % str(self.scratch / "more"))
@@ -144,7 +144,7 @@ class Loaded(Written):
     def test_flags_of_the_interpreter(self):
         self.node("VALUE = 1 if __debug__ else 2")  # assert does nothing with PYTHONOPTIMIZE
         self.kept(1)
-        with self.environment(PYTHONOPTIMIZE="1"):
+        with self.with_variables(PYTHONOPTIMIZE="1"):
             self.kept(2)
         self.kept(1)
 
@@ -153,13 +153,13 @@ class Loaded(Written):
         for name in ("python", "python-of-another-name"):
             link = self.scratch / name
             link.symlink_to("/usr/bin/python3")
-            with self.environment(MARROW_PYTHON=link):
+            with self.with_variables(MARROW_PYTHON=link):
                 self.kept(len(str(link)))
 
     def test_a_distribution_of_another_name_than_its_package(self):
         """As Pillow 9.4 and 9.5: the package is PIL, and its first file is the same in both."""
         for listed, lines in (("top_level.txt", "pictures\n"), ("RECORD", "pictures/__init__.py,,\n")):
-            with self.subTest(listed), self.environment(PYTHONPATH=self.scratch / listed / "site-packages"):
+            with self.subTest(listed), self.with_variables(PYTHONPATH=self.scratch / listed / "site-packages"):
                 site = listed + "/site-packages/"
                 self.module(site + "pictures/__init__.py", "from .version import VALUE\n")
                 self.module(site + "pictures/version.py", "VALUE = 94\n")
@@ -177,7 +177,7 @@ class Loaded(Written):
     def test_bytecode_of_the_search_path_is_not_trusted(self):
         import py_compile
 
-        with self.environment(PYTHONPATH=self.scratch / "path"):
+        with self.with_variables(PYTHONPATH=self.scratch / "path"):
             helper = self.module("path/helper.py", "VALUE = 1\n")
             py_compile.compile(str(helper))
             time = helper.stat().st_mtime_ns
@@ -200,7 +200,7 @@ class Loaded(Written):
         folder = pathlib.Path(os.fsdecode(os.fsencode(self.scratch) + b"/caf\xe9"))
         folder.mkdir()
         (folder / "helper.py").write_text("VALUE = 1\n")
-        with self.environment(PYTHONPATH=folder):
+        with self.with_variables(PYTHONPATH=folder):
             self.node("from helper import VALUE")
             self.kept(1)
             (folder / "helper.py").write_text("VALUE = 2\n")

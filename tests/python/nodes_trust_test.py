@@ -58,7 +58,7 @@ class Trust(Written):
     def test_a_folder_of_the_search_path(self):
         """The interpreter itself runs sitecustomize.py of such a folder."""
         (self.open / "theirs.py").rename(self.open / "sitecustomize.py")
-        with self.environment(PYTHONPATH=self.open):
+        with self.with_variables(PYTHONPATH=self.open):
             self.node("VALUE = 5")
             self.assertIn(self.untrusted(self.open), self.doctor())
             self.assertFalse(self.mark.exists())

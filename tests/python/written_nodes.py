@@ -82,7 +82,7 @@ class Written(Refusing):
         return file
 
     @contextlib.contextmanager
-    def environment(self, **variables):
+    def with_variables(self, **variables):
         """These variables, of which None is not set, for this process and those that it starts."""
         before = dict(os.environ)
         for name, text in variables.items():
