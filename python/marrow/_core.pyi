@@ -1,5 +1,19 @@
 # SPDX-License-Identifier: Apache-2.0
-from typing import Any, Callable, Dict, Iterable, Iterator, List, Mapping, Optional, Sequence, Tuple, Union, overload
+from typing import (
+    Any,
+    Callable,
+    Dict,
+    Final,
+    Iterable,
+    Iterator,
+    List,
+    Mapping,
+    Optional,
+    Sequence,
+    Tuple,
+    Union,
+    overload,
+)
 
 import numpy
 import numpy.typing
@@ -18,12 +32,9 @@ class Buffer: ...
 
 class Transform:
     def __init__(self, matrix: ArrayLike, *, target: str = "world", source: str = "ct") -> None: ...
-    @property
-    def matrix(self) -> Array: ...
-    @property
-    def target(self) -> str: ...
-    @property
-    def source(self) -> str: ...
+    matrix: Final[Array]
+    target: Final[str]
+    source: Final[str]
     def inverse(self) -> Transform: ...
     @overload
     def __matmul__(self, other: Transform) -> Transform: ...
@@ -33,32 +44,22 @@ class Transform:
 class Image:
     type: str
     def __init__(self, array: ArrayLike) -> None: ...
-    @property
-    def array(self) -> Array: ...
-    @property
-    def width(self) -> int: ...
-    @property
-    def height(self) -> int: ...
+    array: Final[Array]
+    width: Final[int]
+    height: Final[int]
 
 class Picture:
     type: str
-    @property
-    def array(self) -> Array: ...
+    array: Final[Array]
 
 class _Samples:
     type: str
-    @property
-    def array(self) -> Array: ...
-    @property
-    def size(self) -> Tuple[int, int, int]: ...
-    @property
-    def spacing_mm(self) -> Tuple[float, float, float]: ...
-    @property
-    def origin_mm(self) -> Tuple[float, float, float]: ...
-    @property
-    def direction(self) -> Array: ...
-    @property
-    def frame(self) -> str: ...
+    array: Final[Array]
+    size: Final[Tuple[int, int, int]]
+    spacing_mm: Final[Tuple[float, float, float]]
+    origin_mm: Final[Tuple[float, float, float]]
+    direction: Final[Array]
+    frame: Final[str]
     def __init__(
         self,
         array: ArrayLike,
@@ -75,115 +76,74 @@ class SignedField(_Samples): ...
 class Mesh:
     type: str
     def __init__(self, vertices_mm: ArrayLike, triangles: ArrayLike, *, frame: str = "ct") -> None: ...
-    @property
-    def vertices_mm(self) -> Array: ...
-    @property
-    def triangles(self) -> Array: ...
-    @property
-    def frame(self) -> str: ...
+    vertices_mm: Final[Array]
+    triangles: Final[Array]
+    frame: Final[str]
 
 class Camera:
     type: str
-    def __init__(
-        self, width_px: int, height_px: int, intrinsics: ArrayLike, camera_from_world: ArrayLike
-    ) -> None: ...
-    @property
-    def width_px(self) -> int: ...
-    @property
-    def height_px(self) -> int: ...
-    @property
-    def intrinsics(self) -> Array: ...
-    @property
-    def camera_from_world(self) -> Array: ...
+    def __init__(self, width_px: int, height_px: int, intrinsics: ArrayLike, camera_from_world: ArrayLike) -> None: ...
+    width_px: Final[int]
+    height_px: Final[int]
+    intrinsics: Final[Array]
+    camera_from_world: Final[Array]
 
 class View:
     type: str
     def __init__(
-        self,
-        image: Union[Image, ArrayLike],
-        camera: Camera,
-        *,
-        mask: Optional[ArrayLike] = None,
-        name: str = "view",
+        self, image: Union[Image, ArrayLike], camera: Camera, *, mask: Optional[ArrayLike] = None, name: str = "view"
     ) -> None: ...
-    @property
-    def name(self) -> str: ...
-    @property
-    def image(self) -> Image: ...
-    @property
-    def camera(self) -> Camera: ...
-    @property
-    def mask(self) -> Optional[Array]: ...
+    name: Final[str]
+    image: Final[Image]
+    camera: Final[Camera]
+    mask: Final[Optional[Array]]
 
 class Pose:
     type: str
     def __init__(
         self, matrix: ArrayLike, *, target: str = "world", source: str = "ct", axes_of: Optional["Pose"] = None
     ) -> None: ...
-    @property
-    def matrix(self) -> Array: ...
-    @property
-    def transform(self) -> Transform: ...
-    @property
-    def target(self) -> str: ...
-    @property
-    def source(self) -> str: ...
-    @property
-    def covariance(self) -> Optional[Array]: ...
-    @property
-    def axes(self) -> Array: ...
-    @property
-    def origin_mm(self) -> Array: ...
-    @property
-    def warnings(self) -> List[str]: ...
-    @property
-    def cost(self) -> float: ...
-    @property
-    def evaluations(self) -> int: ...
-    @property
-    def convergence(self) -> List[Tuple[int, float]]: ...
+    matrix: Final[Array]
+    transform: Final[Transform]
+    target: Final[str]
+    source: Final[str]
+    covariance: Final[Optional[Array]]
+    axes: Final[Array]
+    origin_mm: Final[Array]
+    warnings: Final[List[str]]
+    cost: Final[float]
+    evaluations: Final[int]
+    convergence: Final[List[Tuple[int, float]]]
 
 class Truth:
     type: str
-    @property
-    def matrix(self) -> Array: ...
-    @property
-    def transform(self) -> Transform: ...
+    matrix: Final[Array]
+    transform: Final[Transform]
 
 class Seeds:
     type: str
     def __init__(self, fragment: str, points_mm: ArrayLike, *, wanted: bool = True) -> None: ...
-    @property
-    def fragment(self) -> str: ...
-    @property
-    def wanted(self) -> bool: ...
-    @property
-    def points_mm(self) -> Array: ...
+    fragment: Final[str]
+    wanted: Final[bool]
+    points_mm: Final[Array]
 
 class Landmarks:
     type: str
     def __init__(self, points_mm: Dict[str, Any], seen_px: Dict[str, Dict[str, Any]] = {}) -> None: ...
-    @property
-    def points_mm(self) -> Dict[str, Array]: ...
-    @property
-    def seen_px(self) -> Dict[str, Dict[str, Array]]: ...
+    points_mm: Final[Dict[str, Array]]
+    seen_px: Final[Dict[str, Dict[str, Array]]]
 
 class Scene:
     type: str
-    @property
-    def models(self) -> Dict[str, Mesh]: ...
-    @property
-    def placements(self) -> List[Tuple[str, str, Array]]: ...
+    models: Final[Dict[str, Mesh]]
+    placements: Final[List[Tuple[str, str, Array]]]
 
 class EdgeMap:
     type: str
     def __init__(self, pixels: ArrayLike, *, width_px: int, height_px: int) -> None: ...
-    @property
-    def width_px(self) -> int: ...
-    @property
-    def height_px(self) -> int: ...
-    @property
-    def pixels(self) -> Array: ...
+    width_px: Final[int]
+    height_px: Final[int]
+    pixels: Final[Array]
     def __len__(self) -> int: ...
 
 class ShaftLines:
@@ -198,26 +158,18 @@ class ShaftLines:
         log_likelihood: float = 0.0,
         rejected: Iterable[Tuple[ArrayLike, ArrayLike, str]] = ...,
     ) -> None: ...
-    @property
-    def log_likelihood(self) -> float: ...
-    @property
-    def rejected(self) -> List[Tuple[_Ends, _Ends, str]]: ...
-    @property
-    def left(self) -> _Ends: ...
-    @property
-    def right(self) -> _Ends: ...
-    @property
-    def width_mm(self) -> float: ...
-    @property
-    def width_deviation_mm(self) -> float: ...
+    log_likelihood: Final[float]
+    rejected: Final[List[Tuple[_Ends, _Ends, str]]]
+    left: Final[_Ends]
+    right: Final[_Ends]
+    width_mm: Final[float]
+    width_deviation_mm: Final[float]
 
 class Metrics:
     type: str
     def __init__(self, values: Dict[str, float], units: Dict[str, str] = ...) -> None: ...
-    @property
-    def values(self) -> Dict[str, float]: ...
-    @property
-    def units(self) -> Dict[str, str]: ...
+    values: Final[Dict[str, float]]
+    units: Final[Dict[str, str]]
     def __getitem__(self, name: str) -> float: ...
     def __len__(self) -> int: ...
     def __iter__(self) -> Iterator[str]: ...
@@ -233,58 +185,39 @@ class Verdict:
         remedies: List[str] = ...,
         figures: Metrics = ...,
     ) -> None: ...
-    @property
-    def judgement(self) -> str: ...
-    @property
-    def failure_probability(self) -> Optional[float]: ...
-    @property
-    def reasons(self) -> List[str]: ...
-    @property
-    def remedies(self) -> List[str]: ...
-    @property
-    def figures(self) -> Dict[str, float]: ...
+    judgement: Final[str]
+    failure_probability: Final[Optional[float]]
+    reasons: Final[List[str]]
+    remedies: Final[List[str]]
+    figures: Final[Dict[str, float]]
 
 class Stop:
     type: str
-    @property
-    def stops(self) -> bool: ...
-    @property
-    def reason(self) -> str: ...
+    stops: Final[bool]
+    reason: Final[str]
 
 class Profile:
-    @property
-    def axis(self) -> str: ...
-    @property
-    def unit(self) -> str: ...
-    @property
-    def offsets(self) -> Array: ...
-    @property
-    def costs(self) -> Array: ...
-    @property
-    def truth(self) -> Optional[float]: ...
+    axis: Final[str]
+    unit: Final[str]
+    offsets: Final[Array]
+    costs: Final[Array]
+    truth: Final[Optional[float]]
 
 class Landscape:
     type: str
-    @property
-    def profiles(self) -> List[Profile]: ...
+    profiles: Final[List[Profile]]
     def plot(self, figure: Any = None) -> Any: ...
 
 class Case:
     type: str
-    @property
-    def ct(self) -> Volume: ...
-    @property
-    def views(self) -> Items[Any]: ...
-    @property
-    def seeds(self) -> Items[Any]: ...
-    @property
-    def start(self) -> Optional[Items[Any]]: ...
-    @property
-    def truth(self) -> Optional[Items[Any]]: ...
+    ct: Final[Volume]
+    views: Final[Items[Any]]
+    seeds: Final[Items[Any]]
+    start: Final[Optional[Items[Any]]]
+    truth: Final[Optional[Items[Any]]]
 
 class OtherValue:
-    @property
-    def type(self) -> str: ...
+    type: Final[str]
 
 def digest_of(value: Any) -> Optional[str]:
     """A text that is the same for values of the same content, of types of plugins too. None for functions, lists and
@@ -311,14 +244,10 @@ class OutlineProjector(OtherValue):
     def __call__(self, camera: Union[Camera, View], pose: _Pose, *, spacing_px: float = 1) -> Array: ...
 
 class Minimum:
-    @property
-    def x(self) -> Array: ...
-    @property
-    def value(self) -> float: ...
-    @property
-    def evaluations(self) -> int: ...
-    @property
-    def stopped_because(self) -> str: ...
+    x: Final[Array]
+    value: Final[float]
+    evaluations: Final[int]
+    stopped_because: Final[str]
 
 class Optimizer(OtherValue):
     def minimise(
@@ -334,16 +263,11 @@ class Optimizer(OtherValue):
     ) -> Minimum: ...
 
 class ReadPipeline:
-    @property
-    def name(self) -> str: ...
-    @property
-    def help(self) -> str: ...
-    @property
-    def notes(self) -> List[str]: ...
-    @property
-    def nodes(self) -> List[Tuple[str, str]]: ...
-    @property
-    def outputs(self) -> List[str]: ...
+    name: Final[str]
+    help: Final[str]
+    notes: Final[List[str]]
+    nodes: Final[List[Tuple[str, str]]]
+    outputs: Final[List[str]]
     def with_only(self, names: List[str]) -> ReadPipeline: ...
     def with_given(self, given: Dict[str, Any]) -> ReadPipeline: ...
     def resolved_yaml(self) -> str: ...
@@ -351,22 +275,14 @@ class ReadPipeline:
 class Run:
     def output(self, name: str) -> Any: ...
     def write(self, folder: str) -> None: ...
-    @property
-    def outputs(self) -> List[str]: ...
-    @property
-    def nodes(self) -> List[Dict[str, Any]]: ...
-    @property
-    def seconds(self) -> float: ...
-    @property
-    def failed(self) -> bool: ...
-    @property
-    def warnings(self) -> List[Tuple[str, str]]: ...
-    @property
-    def folder(self) -> str: ...
-    @property
-    def recipe(self) -> Optional[str]: ...
-    @property
-    def written(self) -> List[Tuple[str, List[str], str, str]]: ...
+    outputs: Final[List[str]]
+    nodes: Final[List[Dict[str, Any]]]
+    seconds: Final[float]
+    failed: Final[bool]
+    warnings: Final[List[Tuple[str, str]]]
+    folder: Final[str]
+    recipe: Final[Optional[str]]
+    written: Final[List[Tuple[str, List[str], str, str]]]
 
 def forget_catalogue() -> None:
     """Looks for plugins again when they are next needed."""

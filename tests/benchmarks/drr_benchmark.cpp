@@ -5,34 +5,33 @@
 #include <tbb/global_control.h>
 #include <tbb/parallel_for.h>
 
-#include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <cstdio>
 #include <cstring>
-#include <ctime>
 #include <fstream>
 #include <random>
 
 #include "marrow/domain/c_arm.hpp"
 #include "marrow/plugin.hpp"
-#include "marrow/runtime/plugins/catalogue.hpp"
+#include "tests/benchmarks/timing.hpp"
 
 namespace {
 
 using namespace marrow;
 
-/// A thigh: soft tissue that fills the volume, in it a bent hollow bone with a spongy end.
+/// A thigh: soft tissue that fills the volume, in it a bent hollow bone with a spongy end. Of a short run, an eighth of
+/// the voxels in each direction.
 Volume thigh(bool bone_only) {
+  const int part = timing::is_short() ? 8 : 1;
   Volume volume;
-  volume.grid.size = {256, 256, 384};
-  volume.grid.spacing_mm = {0.8, 0.8, 1.0};
+  volume.grid.size = {256 / part, 256 / part, 384 / part};
+  volume.grid.spacing_mm = part * Eigen::Vector3d(0.8, 0.8, 1.0);
   volume.grid.origin_mm = -Eigen::Vector3d(255 * 0.4, 255 * 0.4, 383 * 0.5);
   volume.values.resize(volume.grid.count());
-  tbb::parallel_for(0, 384, [&](int z) {
+  tbb::parallel_for(0, volume.grid.size[2], [&](int z) {
     std::mt19937 random(std::uint32_t(z) + 1);
-    for (int y = 0; y < 256; ++y)
-      for (int x = 0; x < 256; ++x) {
+    for (int y = 0; y < volume.grid.size[1]; ++y)
+      for (int x = 0; x < volume.grid.size[0]; ++x) {
         const Eigen::Vector3d p = volume.grid.point_from_index({double(x), double(y), double(z)});
         const double flare = 14 + 22 / (1 + std::exp((p.z() + 140) / 12));
         const double radius = std::hypot(p.x() - 0.0004 * p.z() * p.z(), p.y()),
@@ -53,7 +52,7 @@ Camera camera_of(int pixels) {
 
 std::shared_ptr<const RadiographProjector> projector(const Catalogue& catalogue, const std::string& name,
                                                      const Volume& volume, double step_mm = 0) {
-  const NodeDefinition& node = catalogue.load(name);
+  const NodeDefinition& node = timing::node(catalogue, name);
   std::vector<Value> inputs;
   for (const PortInfo& port : node.info.inputs) {
     Value value;
@@ -81,13 +80,8 @@ std::shared_ptr<const RadiographProjector> projector(const Catalogue& catalogue,
 
 double median_ms(const std::function<void()>& work) {
   std::vector<double> times;
-  for (int i = 0; i < 9; ++i) {
-    const auto start = std::chrono::steady_clock::now();
-    work();
-    times.push_back(std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count());
-  }
-  std::nth_element(times.begin(), times.begin() + 4, times.end());
-  return times[4];
+  for (int i = 0; i < timing::rounds(9); ++i) times.push_back(timing::milliseconds(work));
+  return timing::median(times);
 }
 
 void write(const std::filesystem::path& path, const void* data, std::size_t bytes) {
@@ -97,10 +91,11 @@ void write(const std::filesystem::path& path, const void* data, std::size_t byte
 void write_volume(const std::filesystem::path& path, const Volume& volume) {
   const std::vector<std::int16_t> values(volume.values.begin(), volume.values.end());
   std::ofstream stream(path, std::ios::binary);
+  const Eigen::Vector3i size(volume.grid.size.data());
   stream << "ObjectType = Image\nNDims = 3\nBinaryData = True\nBinaryDataByteOrderMSB = False\nTransformMatrix = 1 0 0 "
             "0 1 0 0 0 1\nOffset = "
-         << volume.grid.origin_mm.transpose()
-         << "\nElementSpacing = 0.8 0.8 1\nDimSize = 256 256 384\nElementType = MET_SHORT\nElementDataFile = LOCAL\n";
+         << volume.grid.origin_mm.transpose() << "\nElementSpacing = " << volume.grid.spacing_mm.transpose()
+         << "\nDimSize = " << size.transpose() << "\nElementType = MET_SHORT\nElementDataFile = LOCAL\n";
   stream.write(reinterpret_cast<const char*>(values.data()), std::streamsize(2 * values.size()));
 }
 
@@ -121,11 +116,9 @@ double rms(const std::vector<float>& a, const std::vector<float>& b) {
 /// Looked up, of a bone that is turned by a few degrees against what was kept; `fine` draws the truth.
 void lookup(const Catalogue& catalogue, const Volume& volume, const std::string& what, const RadiographProjector& fine,
             const char* folder) {
-  const auto start = std::chrono::steady_clock::now();
-  const std::clock_t processor = std::clock();
+  const timing::Stopwatch stopwatch;
   const auto one = projector(catalogue, "project.lightfield", volume);
-  const double processor_s = double(std::clock() - processor) / CLOCKS_PER_SEC;
-  const double made_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  const double processor_s = stopwatch.processor_s(), made_s = stopwatch.seconds();
   if (folder) {
     const auto values = one->radiograph(camera_of(256), {"world", "ct"}, PixelGrid{0, 0, 1, 256, 256});
     write(std::filesystem::path(folder) / (what + "_lightfield_256.f32"), values.data(), 4 * values.size());
@@ -151,7 +144,7 @@ void lookup(const Catalogue& catalogue, const Volume& volume, const std::string&
 /// 64 poses near each other, several at a time, as a search computes them: wall clock and time of all processors, as
 /// multiples of those of project.joseph, in turns.
 void batches(const Catalogue& catalogue, const Volume& volume) {
-  constexpr int kPoses = 64, kTurns = 3;
+  const int kPoses = timing::rounds(64), kTurns = timing::rounds(3);
   const Camera camera = camera_of(512);
   const PixelGrid grid{0, 0, 1, 512, 512};
   std::vector<RigidTransform> poses;
@@ -165,8 +158,7 @@ void batches(const Catalogue& catalogue, const Volume& volume) {
              opencl = projector(catalogue, "project.opencl", volume);
   for (const bool with_slopes : {false, true}) {
     const auto times_s = [&](const RadiographProjector& one) {
-      const auto start = std::chrono::steady_clock::now();
-      const std::clock_t processor = std::clock();
+      const timing::Stopwatch stopwatch;
       tbb::parallel_for(0, kPoses, [&](int i) {
         const RigidTransform& pose = poses[std::size_t(i)];
         if (with_slopes)
@@ -174,8 +166,7 @@ void batches(const Catalogue& catalogue, const Volume& volume) {
         else
           one.radiograph(camera, pose, grid);
       });
-      return std::array{std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count(),
-                        double(std::clock() - processor) / CLOCKS_PER_SEC};
+      return std::array{stopwatch.seconds(), stopwatch.processor_s()};
     };
     for (int turn = 0; turn < kTurns; ++turn) {
       const auto theirs = times_s(*joseph), ours = times_s(*opencl);
@@ -187,20 +178,13 @@ void batches(const Catalogue& catalogue, const Volume& volume) {
   }
 }
 
-}  // namespace
-
-int main(int argc, char** argv) {
-  const tbb::global_control threads(tbb::global_control::max_allowed_parallelism, 2);
-  const Catalogue catalogue;
-  if (argc > 1 && std::string(argv[1]) == "--batches") {
-    batches(catalogue, thigh(false));
-    return 0;
-  }
+/// Times and errors of all projectors; with a folder, its images.
+void each_projector(const Catalogue& catalogue, const char* folder) {
   const RigidTransform world_from_model{"world", "ct"};
   for (const bool bone_only : {false, true}) {
     const Volume volume = thigh(bone_only);
     const std::string what = bone_only ? "bone" : "thigh";
-    if (argc > 1) write_volume(std::filesystem::path(argv[1]) / (what + ".mha"), volume);
+    if (folder) write_volume(std::filesystem::path(folder) / (what + ".mha"), volume);
     const auto fine = projector(catalogue, "project.ray_casting", volume, 0.05);
     for (const std::string name : {"joseph", "ray_casting", "siddon_jacobs"}) {
       const auto one = projector(catalogue, "project." + name, volume);
@@ -209,15 +193,15 @@ int main(int argc, char** argv) {
         const PixelGrid grid{0, 0, 1, pixels, pixels};
         std::vector<float> values;
         const double ms = median_ms([&] { values = one->radiograph(camera, world_from_model, grid); });
-        if (argc > 1)
-          write(std::filesystem::path(argv[1]) / (what + "_" + name + "_" + std::to_string(pixels) + ".f32"),
+        if (folder)
+          write(std::filesystem::path(folder) / (what + "_" + name + "_" + std::to_string(pixels) + ".f32"),
                 values.data(), 4 * values.size());
         std::printf("%-6s %-14s %d x %d: %7.2f ms", what.c_str(), name.c_str(), pixels, pixels, ms);
         if (pixels == 256) {  // the reference takes too long at twice the size
           const auto reference = fine->radiograph(camera, world_from_model, grid);
           std::printf(", root mean square error %.4f mm of water", rms(values, reference));
-          if (argc > 1)
-            write(std::filesystem::path(argv[1]) / (what + "_reference_256.f32"), reference.data(),
+          if (folder)
+            write(std::filesystem::path(folder) / (what + "_reference_256.f32"), reference.data(),
                   4 * reference.size());
         }
         std::printf("\n");
@@ -226,6 +210,20 @@ int main(int argc, char** argv) {
       std::printf("%-6s %-14s 2000 pixels: %.3f ms\n", what.c_str(), name.c_str(),
                   median_ms([&] { one->radiograph(camera_of(512), world_from_model, sparse); }));
     }
-    lookup(catalogue, volume, what, *fine, argc > 1 ? argv[1] : nullptr);
+    lookup(catalogue, volume, what, *fine, folder);
   }
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  const tbb::global_control threads(tbb::global_control::max_allowed_parallelism, 2);
+  return timing::exit_code_of([&] {
+    const Catalogue catalogue;
+    if (argc > 1 && std::string(argv[1]) == "--batches")
+      batches(catalogue, thigh(false));
+    else
+      each_projector(catalogue, argc > 1 ? argv[1] : nullptr);
+    return 0;
+  });
 }

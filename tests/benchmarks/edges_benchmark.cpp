@@ -4,16 +4,11 @@
 // besides; it may take ten times as long. Exit code 1 when it takes longer.
 #include <tbb/global_control.h>
 
-#include <algorithm>
-#include <chrono>
 #include <cstdio>
-#include <cstdlib>
-#include <iostream>
-#include <marrow/base/error.hpp>
 #include <marrow/runtime/node/types.hpp>
-#include <marrow/runtime/plugins/catalogue.hpp>
 #include <opencv2/imgproc.hpp>
 
+#include "tests/benchmarks/timing.hpp"
 #include "tests/plugins/edges/radiograph.hpp"
 
 namespace {
@@ -22,18 +17,7 @@ constexpr int kSize_px = 1024, kRounds = 31;
 constexpr double kLimit = 10, kSigma_px = 1.5;
 constexpr double kLow = 16, kHigh = 40;  // with which both find as many edges
 
-/// Milliseconds that a call takes.
-template <class Function>
-double time_ms(Function function) {
-  const auto start = std::chrono::steady_clock::now();
-  function();
-  return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
-}
-
-double median(std::vector<double> values) {
-  std::nth_element(values.begin(), values.begin() + std::ptrdiff_t(values.size() / 2), values.end());
-  return values[values.size() / 2];
-}
+using timing::median, timing::milliseconds;
 
 int run(const std::string& name, int threads) {
   const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, std::size_t(threads));
@@ -44,18 +28,18 @@ int run(const std::string& name, int threads) {
   view.image.pixels.convertTo(eight_bits, CV_8U, 255.0 / 8000);
 
   const marrow::Catalogue catalogue;
-  const marrow::NodeDefinition& node = catalogue.load(name);
+  const marrow::NodeDefinition& node = timing::node(catalogue, name);
   const std::shared_ptr<void> options = node.make_options();
   const std::vector<marrow::Value> inputs{marrow::Value::of(std::make_shared<const marrow::View>(view))};
   marrow::Context context(1);
   std::size_t edges = 0;
   int canny_edges = 0;
   std::vector<double> ours_ms, canny_ms;
-  for (int round = 0; round < kRounds; ++round) {
-    ours_ms.push_back(
-        time_ms([&] { edges = node.call(inputs, options.get(), context)[0].as<marrow::EdgeMap>().pixels.size(); }));
+  for (int round = 0; round < timing::rounds(kRounds); ++round) {
+    ours_ms.push_back(milliseconds(
+        [&] { edges = node.call(inputs, options.get(), context)[0].as<marrow::EdgeMap>().pixels.size(); }));
     cv::Mat blurred, found;
-    canny_ms.push_back(time_ms([&] {
+    canny_ms.push_back(milliseconds([&] {
       cv::GaussianBlur(eight_bits, blurred, {0, 0}, kSigma_px);
       cv::Canny(blurred, found, kLow, kHigh, 3, true);
     }));
@@ -67,17 +51,12 @@ int run(const std::string& name, int threads) {
       "%.0f\n",
       name.c_str(), threads, threads > 1 ? "s" : "", median(ours_ms), edges, median(canny_ms), canny_edges, ratio,
       kLimit);
-  return ratio > kLimit;
+  return ratio > kLimit && !timing::is_short();
 }
 
 }  // namespace
 
 int main(int count, char** arguments) {
-  try {
-    const std::string name = count > 1 ? arguments[1] : "edges.adaptive_relaxation";
-    return run(name, 2) | run(name, 1);
-  } catch (const std::exception& error) {
-    std::cerr << error.what() << "\n";
-    return 2;
-  }
+  const std::string name = count > 1 ? arguments[1] : "edges.adaptive_relaxation";
+  return timing::exit_code_of([&] { return run(name, 2) | run(name, 1); });
 }

@@ -6,40 +6,28 @@
 #include <tbb/global_control.h>
 #include <unistd.h>
 
-#include <chrono>
 #include <cstdio>
 #include <cstring>
 
 #include "itk_geodesic.hpp"
 #include "marrow/toolbox/field/interior.hpp"
 #include "plugins/segment/level_set.cpp"
+#include "tests/benchmarks/timing.hpp"
 #include "tests/plugins/segment/distal_end.hpp"
 
 namespace {
 
 constexpr unsigned kThreads = 2;
 
-/// Wall seconds, and the processors' seconds, which other programs on the machine disturb less.
-class Stopwatch {
- public:
-  std::string text() const {
-    char text[80];
-    std::snprintf(text, sizeof text, "%.2f s (%.2f s of processor time)",
-                  std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count(),
-                  used_s() - used_at_start_s_);
-    return text;
-  }
+using timing::Stopwatch;
 
- private:
-  static double used_s() {
-    rusage usage{};
-    getrusage(RUSAGE_SELF, &usage);
-    return double(usage.ru_utime.tv_sec + usage.ru_stime.tv_sec) +
-           1e-6 * double(usage.ru_utime.tv_usec + usage.ru_stime.tv_usec);
-  }
-  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
-  double used_at_start_s_ = used_s();
-};
+std::string text_of(const Stopwatch& stopwatch) {
+  char text[80];
+  std::snprintf(text, sizeof text, "%.2f s (%.2f s of processor time)", stopwatch.seconds(), stopwatch.processor_s());
+  return text;
+}
+
+bool has_failed = false;
 
 /// Runs work in a process of its own, with two threads, and prints its peak memory.
 void measure(const char* what, const std::function<void()>& work) {
@@ -52,6 +40,8 @@ void measure(const char* what, const std::function<void()>& work) {
       work();
     } catch (const std::exception& error) {
       std::printf("  failed: %s\n", error.what());
+      std::fflush(stdout);
+      _exit(1);
     }
     std::fflush(stdout);
     _exit(0);
@@ -59,6 +49,7 @@ void measure(const char* what, const std::function<void()>& work) {
   int status = 0;
   rusage usage{};
   wait4(child, &status, 0, &usage);
+  has_failed |= status != 0;
   std::printf("  peak memory %.2f GB\n", double(usage.ru_maxrss) / 1048576);
 }
 
@@ -90,7 +81,7 @@ void our_level_set(const phantom::DistalEnd& bone, const Volume& volume, const O
   Context context = logging();
   const Stopwatch stopwatch;
   const auto fields = level_set_fields(volume, bone.seeds(), options, context);
-  std::printf("  %s for both fragments\n", stopwatch.text().c_str());
+  std::printf("  %s for both fragments\n", text_of(stopwatch).c_str());
   print_accuracy(bone, fields);
 }
 
@@ -108,7 +99,7 @@ void itk_contour(const phantom::DistalEnd& bone, const Volume& volume, const itk
   const Stopwatch stopwatch;
   const auto results =
       itk_peer::geodesic_active_contours(volume.values, volume.grid.size, {s.x(), s.y(), s.z()}, seeds, settings);
-  std::printf("  %s for both fragments: speed image %.2f s", stopwatch.text().c_str(), results[0].speed_image_s);
+  std::printf("  %s for both fragments: speed image %.2f s", text_of(stopwatch).c_str(), results[0].speed_image_s);
   for (std::size_t f = 0; f < results.size(); ++f)
     std::printf(", %s %d iterations %.2f s", list.name(f).c_str(), results[f].iterations, results[f].contour_s);
   std::printf("\n");
@@ -132,12 +123,13 @@ void itk_contour(const phantom::DistalEnd& bone, const Volume& volume, const itk
 
 /// A hollow shaft in a whole CT, its blur by formula: the scene's sub-voxels would fill the memory.
 Volume whole_ct(double length_mm) {
-  Volume volume{phantom::ct_grid({512, 512, 400}), {}};
+  const std::array<int, 3> size = timing::is_short() ? std::array{256, 128, 128} : std::array{512, 512, 400};
+  Volume volume{phantom::ct_grid(size), {}};
   volume.values.resize(volume.grid.count());
-  tbb::parallel_for(0, 400, [&](int z) {
+  tbb::parallel_for(0, size[2], [&](int z) {
     std::minstd_rand random(unsigned(z + 1));
-    for (int y = 0; y < 512; ++y)
-      for (int x = 0; x < 512; ++x) {
+    for (int y = 0; y < size[1]; ++y)
+      for (int x = 0; x < size[0]; ++x) {
         const Eigen::Vector3d p = volume.grid.point_from_index(Eigen::Vector3d(x, y, z));
         const double outer = phantom::round_cone(p, {60, 20, -length_mm / 2}, {70, 25, length_mm / 2}, 22, 14);
         const auto inside = [](double d) { return 1 / (1 + std::exp(std::clamp(2.4 * d / 0.7, -30.0, 30.0))); };
@@ -163,7 +155,7 @@ void whole_ct_case(double length_mm) {
   Context context;
   const Stopwatch stopwatch;
   const auto fields = level_set_fields(volume, seeds, {}, context);
-  const std::string time = stopwatch.text();
+  const std::string time = text_of(stopwatch);
   std::size_t surface = 0;
   for (const SignedField& field : fields)
     for (float value : field.values_mm) surface += std::abs(value) < 0.5f;
@@ -172,17 +164,20 @@ void whole_ct_case(double length_mm) {
 
 }  // namespace
 
-/// Without arguments: everything. "crop", "itk", "whole": only that.
+/// Without arguments: everything. "crop", "itk", "whole": only that. A short run has a smaller CT and few iterations.
 int main(int count, char** arguments) {
   const auto is_asked = [&](const char* what) { return count < 2 || std::strcmp(arguments[1], what) == 0; };
+  itk_peer::Settings settings;
+  settings.most_iterations = timing::is_short() ? 3 : settings.most_iterations;
   std::printf("ITK %s, marrow %s; %u threads\n", itk_peer::version().c_str(), MARROW_VERSION, kThreads);
   const phantom::DistalEnd bone;
   const auto crop = [&] { return bone.scan_of({128, 128, 192}, 40); };
   if (is_asked("crop")) measure("segment.level_set, 128 x 128 x 192", [&] { our_level_set(bone, crop(), {}); });
   if (is_asked("itk"))
-    measure("ITK's geodesic active contour, 128 x 128 x 192", [&] { itk_contour(bone, crop(), {}); });
+    measure("ITK's geodesic active contour, 128 x 128 x 192", [&] { itk_contour(bone, crop(), settings); });
   if (is_asked("whole"))
-    for (const double length_mm : {80.0, 160.0, 320.0})
+    for (const double length_mm : timing::is_short() ? std::vector{80.0} : std::vector{80.0, 160.0, 320.0})
       measure(("segment.level_set, 512 x 512 x 400, bone of " + std::to_string(int(length_mm)) + " mm").c_str(),
               [&] { whole_ct_case(length_mm); });
+  return has_failed ? 2 : 0;
 }

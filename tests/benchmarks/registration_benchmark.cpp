@@ -7,15 +7,15 @@
 #include <benchmark/benchmark.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cstdio>
-#include <iostream>
 #include <map>
 #include <marrow/base/error.hpp>
 #include <marrow/runtime/node/types.hpp>
 #include <marrow/runtime/run/executor.hpp>
 #include <random>
 #include <set>
+
+#include "tests/benchmarks/timing.hpp"
 
 namespace {
 
@@ -30,6 +30,8 @@ marrow::Pipeline read(const marrow::Catalogue& catalogue, const std::string& fil
   arguments.overrides = overrides;
   marrow::Pipeline pipeline =
       marrow::read_pipeline(std::string(MARROW_SOURCE_DIR) + "/pipelines/" + file, arguments, catalogue, diagnostics);
+  for (const marrow::Diagnostic& one : diagnostics.sorted())
+    if (one.message.starts_with("unknown node")) throw timing::NotBuilt(file + ": " + one.message);
   if (!diagnostics.empty()) throw marrow::Error(file + " cannot be used");
   std::erase_if(pipeline.outputs, [&](const auto& item) { return item.name != output; });
   return pipeline;
@@ -106,7 +108,7 @@ BENCHMARK(both_stages)
     ->UseRealTime()
     ->MeasureProcessCPUTime()
     ->Iterations(1)
-    ->Repetitions(15);
+    ->Repetitions(timing::rounds(15));
 
 /// Direction uniform on the sphere, length uniform up to the limit.
 Eigen::Vector3d vector_up_to(double limit, std::mt19937& random) {
@@ -122,7 +124,7 @@ void print(const char* what, std::vector<double> values, const char* unit) {
 }
 
 void from_random_starts(const std::string& title, Prepared prepared) {
-  constexpr int kStarts = 100;
+  const int kStarts = timing::rounds(100);
   const auto& truth = prepared.given<marrow::Mesh>("model");
   const marrow::RigidTransform exact = simulated().truth[0].world_from_model;
   const marrow::FragmentFrame frame = marrow::fragment_frame(truth);
@@ -138,9 +140,9 @@ void from_random_starts(const std::string& title, Prepared prepared) {
     marrow::List<marrow::Pose> starts;
     starts.add(simulated().truth.name(0), start);
     prepared.settings.given["start"] = {Value::of(starts, "fragment")};
-    const auto began = std::chrono::steady_clock::now();
+    const timing::Stopwatch stopwatch;
     const marrow::RunResult result = prepared.result();
-    seconds.push_back(std::chrono::duration<double>(std::chrono::steady_clock::now() - began).count());
+    seconds.push_back(stopwatch.seconds());
     const auto& found =
         marrow::value_of(result, prepared.pipeline.outputs[0].source).items.at(0).as<marrow::Pose>().world_from_model;
     double sum = 0;
@@ -161,15 +163,14 @@ int main(int argc, char** argv) {
   const bool is_filtered = std::any_of(
       argv, argv + argc, [](const char* argument) { return std::string(argument).starts_with("--benchmark_filter"); });
   benchmark::Initialize(&argc, argv);
-  try {
+  return timing::exit_code_of([&] {
+    simulated();
     benchmark::RunSpecifiedBenchmarks();
     if (is_filtered) return 0;
     const std::set<std::string> of_ct{"bone", "model", "outline", "drr"};
     from_random_starts("contour, then grey values",
                        Prepared(catalogue(), simulated(), "femur/femur-intensity.yaml", of_ct));
     from_random_starts("grey values alone", Prepared(catalogue(), simulated(), "femur/femur-grey-values.yaml", of_ct));
-  } catch (const std::exception& error) {
-    std::cerr << error.what() << "\n";
-    return 1;
-  }
+    return 0;
+  });
 }

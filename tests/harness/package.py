@@ -40,6 +40,31 @@ def small_case():
     return _made["case"]
 
 
+class Refusing(Case):
+    """A test of calls that fail."""
+
+    def refuses(self, *rows, kind=marrow.Error):
+        """Each row: a pattern of what is said, and a call that fails for this reason."""
+        for text, call in rows:
+            with self.subTest(text), self.assertRaisesRegex(kind, text):
+                call()
+
+    def fault_of(self, call, kind=marrow.PipelineError):
+        """What the call raises."""
+        with self.assertRaises(kind) as caught:
+            call()
+        return caught.exception
+
+
+class PackageCase(Refusing):
+    """A test with the small case, and the pipeline of the femur on it."""
+
+    def setUp(self):
+        super().setUp()
+        self.folder, self.case = small_case()
+        self.pipeline = marrow.Pipeline(FEMUR, case=self.folder)
+
+
 def interrupt(test, call, after_s=0.5):
     """Calls while a SIGINT comes, which must end the call."""
     timer = threading.Timer(after_s, os.kill, (os.getpid(), signal.SIGINT))

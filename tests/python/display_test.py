@@ -7,7 +7,7 @@ import struct
 import zlib
 
 import numpy
-from harness.package import FEMUR, Case, main, marrow, small_case
+from harness.package import PackageCase, main, marrow
 from marrow.display import MOST_TRIANGLES, coarser, grey, png
 
 
@@ -20,7 +20,7 @@ def pixels_of_png(data):
     return rows[:, 1:].reshape(height, width, channels)
 
 
-class Display(Case):
+class Display(PackageCase):
     def test_a_picture_is_a_png_with_its_pixels(self):
         pixels = numpy.arange(2 * 5 * 3, dtype="uint8").reshape(2, 5, 3)
         self.assertTrue(numpy.array_equal(pixels_of_png(png(pixels)), pixels))
@@ -35,7 +35,6 @@ class Display(Case):
         self.assertEqual(pixels_of_png(data)[0, :, 0].tolist(), [0, 255])
 
     def test_a_large_surface_is_made_coarser(self):
-        _, case = small_case()
         z, y, x = numpy.mgrid[-60:61, -60:61, -60:61]
         field = marrow.SignedField(numpy.sqrt(x**2 + y**2 + z**2) - 55, spacing_mm=(1, 1, 1))
         ball = marrow.mesh.marching_cubes(field)
@@ -51,8 +50,7 @@ class Display(Case):
         self.assertEqual(len(drawn[0]["vertices"]), 3 * len(vertices))
 
     def test_a_result_shows_all_that_people_look_at(self):
-        folder, _ = small_case()
-        result = marrow.Pipeline(FEMUR, case=folder).run()
+        result = self.pipeline.run()
         text = result._repr_html_()
         self.assertIn("verdict distal: " + result["verdict"]["distal"].judgement, text)
         self.assertIn("errors distal final", text)
@@ -87,8 +85,7 @@ class Display(Case):
         )
 
     def test_a_page_is_written_for_a_result_without_a_folder(self):
-        folder, _ = small_case()
-        result = marrow.Pipeline(FEMUR, case=folder).run(only=["view3d", "pose"])
+        result = self.pipeline.run(only=["view3d", "pose"])
         self.assertIsNone(result.folder)
         page = marrow.show(result, open_browser=False)
         self.assertEqual(page, result.folder / "report.html")

@@ -2,9 +2,10 @@
 """Errors in Python: all faults at once, each with its place, its node and what to do."""
 import os
 import shutil
+import unittest.mock
 
 import yaml
-from harness.package import FEMUR, Case, main, marrow, small_case
+from harness.package import FEMUR, PackageCase, main, marrow
 
 FAULTY = """marrow: 1
 nodes:
@@ -24,12 +25,10 @@ outputs: {failed: b, sum: c}
 """
 
 
-class Errors(Case):
+class Errors(PackageCase):
     def test_all_faults_come_at_once_with_their_places(self):
         file = self.write("faulty.yaml", FAULTY)
-        with self.assertRaises(marrow.PipelineError) as caught:
-            marrow.Pipeline(file)
-        error = caught.exception
+        error = self.fault_of(lambda: marrow.Pipeline(file))
         places = [(fault.line, fault.column, fault.node, fault.port, fault.option) for fault in error.faults]
         self.assertEqual(places, [(3, 35, "a", None, "valu"), (6, 16, "b", "b", None), (7, 35, "d", None, "count")])
         self.assertEqual(error.faults[0].message, "'test.constant' has no option 'valu'")
@@ -48,43 +47,32 @@ class Errors(Case):
         ):
             file = self.scratch / ("stored-%d.yaml" % number)
             file.write_bytes(stored)
-            with self.assertRaises(marrow.PipelineError) as caught:
-                marrow.Pipeline(file)
-            self.assertEqual(
-                [(fault.line, fault.column) for fault in caught.exception.faults], [(3, 35), (6, 16), (7, 35)]
-            )
-            self.assertIn("  a: {uses: test.constant, with: {valu: 1}}\n", str(caught.exception))
+            error = self.fault_of(lambda: marrow.Pipeline(file))
+            self.assertEqual([(fault.line, fault.column) for fault in error.faults], [(3, 35), (6, 16), (7, 35)])
+            self.assertIn("  a: {uses: test.constant, with: {valu: 1}}\n", str(error))
 
     def test_a_file_that_is_not_there_or_no_yaml(self):
         with self.assertRaisesRegex(marrow.PipelineError, "nowhere.yaml"):
             marrow.Pipeline(self.scratch / "nowhere.yaml")
-        with self.assertRaises(marrow.PipelineError) as caught:
-            marrow.Pipeline(self.write("open.yaml", "marrow: 1\nnodes: {a: [\n"))
-        self.assertEqual(caught.exception.line, 2)
-        self.assertIsNone(caught.exception.node)
+        error = self.fault_of(lambda: marrow.Pipeline(self.write("open.yaml", "marrow: 1\nnodes: {a: [\n")))
+        self.assertEqual(error.line, 2)
+        self.assertIsNone(error.node)
 
     def test_inputs(self):
-        with self.assertRaises(marrow.PipelineError) as caught:
-            marrow.Pipeline(FEMUR)
-        self.assertEqual(caught.exception.faults[0].message, "input 'case' has no value")
-        self.assertEqual(caught.exception.hint, "give it as  case=VALUE")
-        with self.assertRaisesRegex(
-            marrow.PipelineError, "the pipeline has no input 'cas'\n  hint: did you mean 'case'?"
-        ):
-            marrow.Pipeline(FEMUR, case=".", cas=".")
-        with self.assertRaisesRegex(
-            marrow.Error, "case: expected a bool, number, text, path, or a list of these, got 'dict'"
-        ):
-            marrow.Pipeline(FEMUR, case={})
+        error = self.fault_of(lambda: marrow.Pipeline(FEMUR))
+        self.assertEqual(error.faults[0].message, "input 'case' has no value")
+        self.assertEqual(error.hint, "give it as  case=VALUE")
+        of = lambda **inputs: lambda: marrow.Pipeline(FEMUR, **inputs)
+        hint = "the pipeline has no input 'cas'\n  hint: did you mean 'case'?"
+        self.refuses((hint, of(case=".", cas=".")), kind=marrow.PipelineError)
+        self.refuses(("case: expected a bool, number, text, path, or a list of these, got 'dict'", of(case={})))
 
     def test_a_wrong_change_changes_nothing(self):
         pipeline = marrow.Pipeline(FEMUR, case=".")
         before = pipeline.resolved()
-        with self.assertRaises(marrow.PipelineError) as caught:
-            pipeline.set("edges.hihg", 80)
-        self.assertEqual(caught.exception.file, "set(edges.hihg)")
-        self.assertEqual((caught.exception.node, caught.exception.option), ("edges", "hihg"))
-        self.assertEqual(caught.exception.hint, "did you mean 'high'?")
+        error = self.fault_of(lambda: pipeline.set("edges.hihg", 80))
+        self.assertEqual((error.file, error.node, error.option), ("set(edges.hihg)", "edges", "hihg"))
+        self.assertEqual(error.hint, "did you mean 'high'?")
         with self.assertRaisesRegex(marrow.PipelineError, 'expected a number, got the quoted text "much"'):
             pipeline.set("edges.high", "much")
         with self.assertRaisesRegex(marrow.PipelineError, "there is no node 'cas'") as caught:
@@ -112,9 +100,7 @@ class Errors(Case):
 
     def test_a_node_that_fails(self):
         pipeline = marrow.Pipeline(self.write("failing.yaml", FAILING))
-        with self.assertRaises(marrow.RunError) as caught:
-            pipeline.run()
-        error = caught.exception
+        error = self.fault_of(pipeline.run, marrow.RunError)
         self.assertEqual((error.node, error.line, error.column), ("b", 4, 3))
         self.assertRegex(str(error), r"^node 'b' \(test.fail_above\) failed: ")
         self.assertEqual(error.result.nodes["c"].status, "done")
@@ -122,43 +108,31 @@ class Errors(Case):
         self.assertIsNotNone(error.result["sum"])
 
     def test_wrong_names_and_settings(self):
-        folder, _ = small_case()
-        pipeline = marrow.Pipeline(FEMUR, case=folder)
-        with self.assertRaisesRegex(marrow.Error, "the pipeline has no output 'poes'; did you mean 'pose'?"):
-            pipeline.run(only=["poes"])
-        with self.assertRaisesRegex(marrow.Error, "threads: expected a whole number from 0 to 1024, got -1"):
-            pipeline.run(threads=-1)
-        result = pipeline.run(only=["edges"])
-        with self.assertRaisesRegex(KeyError, "no output 'edge'; there are edges"):
-            result["edge"]
-        with self.assertRaisesRegex(KeyError, "no view 'oblique'; there are frontal, lateral"):
-            result["edges"]["oblique"]
+        result = self.pipeline.run(only=["edges"])
+        self.refuses(
+            ("the pipeline has no output 'poes'; did you mean 'pose'?", lambda: self.pipeline.run(only=["poes"])),
+            ("threads: expected a whole number from 0 to 1024, got -1", lambda: self.pipeline.run(threads=-1)),
+        )
+        self.refuses(
+            ("no output 'edge'; there are edges", lambda: result["edge"]),
+            ("no view 'oblique'; there are frontal, lateral", lambda: result["edges"]["oblique"]),
+            kind=KeyError,
+        )
 
     def test_a_folder_that_the_run_reads_is_refused(self):
-        folder, _ = small_case()
-        pipeline = marrow.Pipeline(FEMUR, case=folder)
-        with self.assertRaisesRegex(marrow.Error, "choose another with folder="):
-            pipeline.run(only=["edges"], folder=folder / "out")
-        before = os.environ["MARROW_CACHE"]
-        try:
-            os.environ["MARROW_CACHE"] = str(folder / "store")
-            with self.assertRaisesRegex(marrow.Error, "set MARROW_CACHE to another folder, or give keep=False"):
-                pipeline.run(only=["edges"])
-            self.assertEqual(len(pipeline.run(only=["edges"], keep=False)["edges"]), 2)
-        finally:
-            os.environ["MARROW_CACHE"] = before
-            shutil.rmtree(folder / "store", ignore_errors=True)
+        run = lambda **more: self.pipeline.run(only=["edges"], **more)
+        self.addCleanup(shutil.rmtree, self.folder / "store", ignore_errors=True)
+        self.refuses(("choose another with folder=", lambda: run(folder=self.folder / "out")))
+        with unittest.mock.patch.dict(os.environ, MARROW_CACHE=str(self.folder / "store")):
+            self.refuses(("set MARROW_CACHE to another folder, or give keep=False", run))
+            self.assertEqual(len(run(keep=False)["edges"]), 2)
 
     def test_a_store_that_cannot_be_used_is_a_warning(self):
         other = self.scratch / "others"
         other.mkdir()
         (other / "letter.txt").write_text("of somebody")
-        before = os.environ["MARROW_CACHE"]
-        try:
-            os.environ["MARROW_CACHE"] = str(other)
-            result = marrow.Pipeline(FEMUR, case=small_case()[0]).run(only=["edges"])
-        finally:
-            os.environ["MARROW_CACHE"] = before
+        with unittest.mock.patch.dict(os.environ, MARROW_CACHE=str(other)):
+            result = self.pipeline.run(only=["edges"])
         self.assertRegex(result.warnings[0], "^results are not kept: ")
 
 

@@ -5,21 +5,10 @@ import threading
 import time
 
 import numpy
+from function_nodes import NEAR
 from harness.package import interrupt, main, marrow, small_case
 from written_nodes import Written, camera, view
 
-SLOW = """import time
-
-@marrow.cost("similarity.slow", summary="takes a while for each batch")
-def slow(views: Annotated[marrow.Items[marrow.View], marrow.over("view")], *, fails: Annotated[bool, "fails"] = False):
-    def costs(poses):
-        if fails:
-            raise marrow.Error("the views are too dark")
-        time.sleep(0.1)
-        return numpy.zeros(len(poses))
-
-    return costs
-"""
 _made = {}
 
 
@@ -81,13 +70,11 @@ class Costs(Written):
 
     def test_what_is_no_pose_is_refused(self):
         cost, _, truth, _ = contour()
-        for wrong, text in (
-            (numpy.eye(3), r"pose: expected 4 x 4 numbers, got 3 x 3"),
-            ([truth, 2 * numpy.eye(4)], r"pose 2: the last row of the matrix must be 0 0 0 1"),
-            (numpy.diag([2.0, 1, 1, 1]), "pose"),
-        ):
-            with self.subTest(text), self.assertRaisesRegex(marrow.Error, text):
-                cost(wrong)
+        self.refuses(
+            ("pose: expected 4 x 4 numbers, got 3 x 3", lambda: cost(numpy.eye(3))),
+            ("pose 2: the last row of the matrix must be 0 0 0 1", lambda: cost([truth, 2 * numpy.eye(4)])),
+            ("pose", lambda: cost(numpy.diag([2.0, 1, 1, 1]))),
+        )
 
     def test_a_cost_goes_on_to_another_node_and_outlives_its_inputs(self):
         cost = marrow.similarity.normalised_cross_correlation(marrow.project.joseph(ball()), [view()])
@@ -95,16 +82,16 @@ class Costs(Written):
         self.assertEqual(len(marrow.evaluate.landscape(cost, marrow.Pose(numpy.eye(4)), profile_points=3).profiles), 6)
 
     def test_errors_and_ctrl_c_of_a_cost(self):
-        self.plugin(SLOW)
-        with self.assertRaisesRegex(marrow.Error, "the views are too dark"):
-            marrow.similarity.slow([view()], fails=True)(numpy.eye(4))
-        cost = marrow.similarity.slow([view()])
+        self.plugin(NEAR)
+        with self.assertRaisesRegex(marrow.Error, "the bowl is broken; take another one"):
+            marrow.similarity.near(does="raise")(numpy.eye(4))
+        cost = marrow.similarity.near(does="tenth")
         poses = numpy.tile(numpy.eye(4), (32000, 1, 1))  # would take 200 s
         interrupt(self, lambda: cost(poses))
 
     def test_other_threads_go_on_while_a_cost_is_computed(self):
-        self.plugin(SLOW)
-        cost = marrow.similarity.slow([view()])
+        self.plugin(NEAR)
+        cost = marrow.similarity.near(does="tenth")
         ended = threading.Event()
         thread = threading.Thread(target=lambda: (cost(numpy.tile(numpy.eye(4), (320, 1, 1))), ended.set()))
         thread.start()
@@ -170,10 +157,10 @@ class Projectors(Written):
         every_fourth = projector(camera(), marrow.Pose(numpy.eye(4)), step_px=4)
         self.assertEqual(every_fourth.shape, (24, 32))
         self.assertLess(numpy.abs(every_fourth - seen[::4, ::4]).max(), 4.5)  # steep at the border
-        with self.assertRaisesRegex(marrow.Error, "step_px: expected a positive number, got 0.0"):
-            projector(camera(), numpy.eye(4), step_px=0)
-        with self.assertRaisesRegex(marrow.Error, "camera: expected a marrow.Camera or a marrow.View"):
-            projector(3, numpy.eye(4))
+        self.refuses(
+            ("step_px: expected a positive number, got 0.0", lambda: projector(camera(), numpy.eye(4), step_px=0)),
+            ("camera: expected a marrow.Camera or a marrow.View", lambda: projector(3, numpy.eye(4))),
+        )
 
     def test_an_outline_lies_where_the_surface_is_seen(self):
         _, outline, truth, views = contour()

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Calls of nodes written in Python: what they get, what they may return, and that results repeat."""
 import numpy
+from all_values import values
 from harness.package import main, marrow
 from written_nodes import Written, processes, view
 
@@ -95,22 +96,13 @@ def same_%s(value: Annotated[marrow.%s, "value"]) -> Annotated[marrow.%s, marrow
                 for name in types
             )
         )
-        samples = numpy.random.default_rng(3).normal(size=(70, 80, 90)).astype("float32")
-        values = {
-            "Volume": marrow.Volume(samples, spacing_mm=(1, 2, 3), origin_mm=(4, 5, 6)),
-            "SignedField": marrow.SignedField(samples, spacing_mm=(1, 2, 3)),
-            "Mesh": marrow.Mesh(
-                [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]]
-            ),
-            "Camera": view().camera,
-            "Pose": marrow.Pose(numpy.eye(4)),
-            "Seeds": marrow.Seeds("distal", [[1, 2, 3]]),
-            "View": view(),
-            "Image": view().image,
-            "EdgeMap": marrow.EdgeMap([[3, 4, 1, 0, 9], [1, 2, 0, 1, 8]], width_px=60, height_px=40),
-            "ShaftLines": marrow.ShaftLines([[0, 0], [0, 9]], [[5, 0], [5, 9]], width_mm=3, width_deviation_mm=1),
-        }
-        for name, value in values.items():
+        made = {type(value).__name__: value for value in values().values()}
+        large = numpy.random.default_rng(3).normal(size=(70, 80, 90)).astype("float32")
+        made["Volume"] = marrow.Volume(large, spacing_mm=(1, 2, 3), origin_mm=(4, 5, 6))
+        made["SignedField"] = marrow.SignedField(large, spacing_mm=(1, 2, 3))
+        made["EdgeMap"] = marrow.EdgeMap([[3, 4, 1, 0, 9], [1, 2, 0, 1, 8]], width_px=60, height_px=40)
+        for name in types:
+            value = made[name]
             with self.subTest(name):
                 same = marrow.node("own.same_" + name.lower())(value)
                 members = [one for one in dir(value) if not one.startswith("_") and one != "type"]
@@ -118,7 +110,7 @@ def same_%s(value: Annotated[marrow.%s, "value"]) -> Annotated[marrow.%s, marrow
                     before, after = getattr(value, member), getattr(same, member)
                     if not repr(before).startswith("<"):
                         self.assertTrue(numpy.array_equal(before, after), member)
-        self.assertEqual(values["EdgeMap"].pixels[0, 0], 1, "in the order of rows")
+        self.assertEqual(made["EdgeMap"].pixels[0, 0], 1, "in the order of rows")
 
     def test_inputs_are_read_only(self):
         self.plugin(

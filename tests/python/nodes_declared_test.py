@@ -131,46 +131,33 @@ def own(view: marrow.View, *, low: Annotated[float, "low"] = 3) -> marrow.EdgeMa
         return line.partition(str(file) + ": it ")[2]
 
     def test_files_that_are_refused(self):
-        node = '@marrow.node("edges.own", summary="own")\n'
-        here = str(self.plugins / "mine.py")
+        node = '@marrow.node("edges.own", summary="own")\ndef own('
+        view, edges = "view: marrow.View", ") -> marrow.EdgeMap: ...\n"
+        here = "cannot be used: %s, line " % (self.plugins / "mine.py")
+        high = ', *, low: Annotated[float, marrow.at_least(5), "low"] = 3'
+        of_no_kind = node.replace("edges.own", "nokind.own")
         for text, expected in (
-            (node + "def own(view: marrow.View -> 3\n", "cannot be used: %s, line 5: SyntaxError: " % here),
+            (node + view + " -> 3\n", here + "5: SyntaxError: "),
+            ("import nosuch  # @marrow.node\n", here + "4, in <module>: ModuleNotFoundError: No module"),
+            (node + "view: int" + edges, "input 'view' of edges.own: expected one of marrow's"),
             (
-                "import nosuch  # @marrow.node\n",
-                "cannot be used: %s, line 4, in <module>: ModuleNotFoundError: No module" % here,
-            ),
-            (
-                node + "def own(view: int) -> marrow.EdgeMap: ...\n",
-                "input 'view' of edges.own: expected one of marrow's",
-            ),
-            (
-                node + "def own(view: marrow.View) -> marrow.Cost: ...\n",
+                node + view + ") -> marrow.Cost: ...\n",
                 "the output of edges.own is a function; use @marrow.cost, @marrow.optimizer or @marrow.projector",
             ),
-            (node + "def own(view: marrow.View): ...\n", "the output of edges.own: expected one of marrow's values"),
+            (node + view + "): ...\n", "the output of edges.own: expected one of marrow's values"),
             (
-                node + "def own(view: marrow.View, *, low=3) -> marrow.EdgeMap: ...\n",
+                node + view + ", *, low=3" + edges,
                 "option 'low' of edges.own: expected bool, int, float, str, pathlib.Path, Literal of texts, or List of "
                 "these, got nothing",
             ),
+            (node + view + ", *, low: float = 3" + edges, "option 'low': has no line of help"),
+            (node + view + high + edges, "option 'low': its default is outside its own range"),
             (
-                node + "def own(view: marrow.View, *, low: float = 3) -> marrow.EdgeMap: ...\n",
-                "option 'low': has no line of help",
-            ),
-            (
-                node + 'def own(view: marrow.View, *, low: Annotated[float, marrow.at_least(5), "low"] = 3)'
-                " -> marrow.EdgeMap: ...\n",
-                "option 'low': its default is outside its own range",
-            ),
-            (
-                node + "def own(view: marrow.Items[marrow.View]) -> marrow.EdgeMap: ...\n",
+                node + "view: marrow.Items[marrow.View]" + edges,
                 'a list is written Annotated[marrow.Items[marrow.View], marrow.over("view")]',
             ),
-            (node + "def own(view: marrow.Mesh) -> marrow.EdgeMap: ...\n", "the kind 'edges' has it as view, not mesh"),
-            (
-                node.replace("edges.own", "nokind.own") + "def own(view: marrow.View) -> marrow.EdgeMap: ...\n",
-                "nokind.own: the kind does not name the output; name it",
-            ),
+            (node + "view: marrow.Mesh" + edges, "the kind 'edges' has it as view, not mesh"),
+            (of_no_kind + view + edges, "nokind.own: the kind does not name the output; name it"),
             ("# @marrow.node\n", "it declares no node; write @marrow.node before a function"),
             ("import os  # @marrow.node\nos.kill(os.getpid(), 11)\n", "crashed while being imported (Segmentation"),
             ("import os  # @marrow.node\nos._exit(3)\n", "ended the process that imported it"),
@@ -183,25 +170,18 @@ def own(view: marrow.View, *, low: Annotated[float, "low"] = 3) -> marrow.EdgeMa
         file.chmod(0o666)
         self.assertIn("chmod go-w", self.program("doctor", code=1))
 
-    def test_an_interpreter_that_is_not_there(self):
+    def test_an_interpreter_that_is_not_there_or_cannot_import_the_package(self):
         self.plugin("# @marrow.node\n")
-        os.environ["MARROW_PYTHON"] = "/nowhere/python3"
-        try:
-            self.assertIn("there is no Python interpreter /nowhere/python3; install", self.program("doctor", code=1))
-        finally:
-            del os.environ["MARROW_PYTHON"]
-
-    def test_an_interpreter_that_cannot_import_the_package(self):
-        self.plugin("# @marrow.node\n")
-        os.environ["MARROW_PYTHON"] = "/bin/false"
-        try:
-            self.assertRegex(
-                self.program("doctor", code=1),
+        for interpreter, text in (
+            ("/nowhere/python3", "there is no Python interpreter /nowhere/python3; install"),
+            (
+                "/bin/false",
                 "it cannot be described: /bin/false cannot import marrow's package from .*; it must have numpy and be "
                 "of the version for which the package was built",
-            )
-        finally:
-            del os.environ["MARROW_PYTHON"]
+            ),
+        ):
+            with self.with_variables(MARROW_PYTHON=interpreter):
+                self.assertRegex(self.program("doctor", code=1), text)
 
     def test_a_file_that_never_ends_is_described_once(self):
         begun = self.scratch / "begun"

@@ -36,9 +36,7 @@ class Faults(Written):
         return int(marrow.own.does(view(), what=what)["process"])
 
     def failure(self, what):
-        with self.assertRaises(marrow.RunError) as caught:
-            self.does(what)
-        return str(caught.exception)
+        return str(self.fault_of(lambda: self.does(what), marrow.RunError))
 
     def test_a_crash_costs_one_call(self):
         self.plugin(CALLS)
@@ -131,34 +129,25 @@ def draws(view: Annotated[marrow.View, "view"], *, context: marrow.Context) -> A
     return marrow.Metrics({"seed": float(context.seed)})
 """
         )
-        with self.assertRaisesRegex(marrow.RunError, "it draws from context.seed, so declare it with random=True"):
-            marrow.own.draws(view())
+        said = "it draws from context.seed, so declare it with random=True"
+        self.refuses((said, lambda: marrow.own.draws(view())), kind=marrow.RunError)
 
     def test_wrong_outputs(self):
-        self.plugin(
-            "class Two(NamedTuple):\n"
-            '    first: Annotated[marrow.Pose, "a"]\n    second: Annotated[marrow.Pose, "b"]\n'
-            + "".join(
-                '\n@marrow.node("own.%s", summary="wrong")\n'
-                'def %s(view: Annotated[marrow.View, "v"]) -> %s: return %s\n' % (name, name, kind, value)
-                for name, kind, value in (
-                    ("none", 'Annotated[marrow.Pose, marrow.named("p")]', "None"),
-                    ("other", 'Annotated[marrow.Pose, marrow.named("p")]', "view"),
-                    ("number", 'Annotated[marrow.Pose, marrow.named("p")]', "7"),
-                    ("many", 'Annotated[marrow.Pose, marrow.named("p")]', "[marrow.Pose(numpy.eye(4))]"),
-                    ("three", "Two", "(1, 2, 3)"),
-                )
-            )
+        pose = 'Annotated[marrow.Pose, marrow.named("p")]'
+        rows = (
+            ("none", pose, "None", "own.none returned nothing for the output 'p'"),
+            ("other", pose, "view", "output 'p': expected pose, got view"),
+            ("number", pose, "7", "output 'p': expected pose, got int"),
+            ("many", pose, "[marrow.Pose(numpy.eye(4))]", "output 'p': expected one pose, got a list"),
+            ("three", "Two", "(1, 2, 3)", "own.three returned 3 values, expected 2"),
         )
-        for name, text in (
-            ("none", "own.none returned nothing for the output 'p'"),
-            ("other", "output 'p': expected pose, got view"),
-            ("number", "output 'p': expected pose, got int"),
-            ("many", "output 'p': expected one pose, got a list"),
-            ("three", "own.three returned 3 values, expected 2"),
-        ):
-            with self.subTest(name), self.assertRaisesRegex(marrow.RunError, text):
-                marrow.node("own." + name)(view())
+        text = 'class Two(NamedTuple):\n    a: Annotated[marrow.Pose, "a"]\n    b: Annotated[marrow.Pose, "b"]\n'
+        for name, kind, value, _ in rows:
+            text += '\n@marrow.node("own.%s", summary="wrong")\n' % name
+            text += 'def %s(view: Annotated[marrow.View, "v"]) -> %s: return %s\n' % (name, kind, value)
+        self.plugin(text)
+        for name, _, _, said in rows:
+            self.refuses((said, lambda: marrow.node("own." + name)(view())), kind=marrow.RunError)
 
     def stop_by_ctrl_c(self, body):
         """Stops a run in which a node runs this code, which does not end by itself."""

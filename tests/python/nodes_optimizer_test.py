@@ -1,66 +1,28 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Optimizers written in Python: they run in a process, and ask back for the values of the function."""
+"""Optimizers written in Python: they run in a process, and ask back for the values of the function. Others take an
+optimizer themselves."""
 import os
 import signal
 import threading
 import time
 
 import numpy
+from function_nodes import FunctionNodes
 from harness.package import main, marrow
 from written_nodes import Written, processes
 
-STEPS = """import time
-
-@marrow.optimizer("optimizer.steps", summary="steps along each axis", traits=["needs_start"], seconds=%d)
-def steps(problem: marrow.Problem, *, does: Annotated[str, "what it does"] = "steps") -> str:
-    if does == "nothing":
-        return "it is of no use"
-    if does == "silent":
-        problem(problem.start)
-        return None
-    if does == "raise":
-        problem(problem.start)
-        raise ValueError("no way down")
-    if does == "nan":
-        problem(problem.start * numpy.nan)
-    if does == "other size":
-        problem([1.0])
-    if does == "hang":
-        problem(problem.start)
-        time.sleep(1000)
-    while does == "endless":
-        problem(problem.start)
-    if does == "crash":
-        problem(problem.start)
-        import os
-        os.abort()
-    if does == "swallow":
-        while True:
-            try:
-                problem(problem.start)
-            except Exception:
-                pass
-    step = problem.initial_step
-    problem(problem.start)
-    while (step > problem.step_tolerance * problem.initial_step).any():
-        around = numpy.vstack([problem.best + numpy.diag(step), problem.best - numpy.diag(step)])
-        before = problem.least
-        problem(around)
-        if problem.least >= before:
-            step = step / 2
-    return "the steps are short"
-"""
+START = marrow.Pose(numpy.eye(4))
 
 
 def bowl(x):
     return float((x[0] - 1) ** 2 + 2 * (x[1] + 2) ** 2 + 3)
 
 
-class Optimizers(Written):
-    def setUp(self):
-        super().setUp()
-        self.file = self.plugin(STEPS % 600)
+def broken(x):
+    raise ValueError("no value here")
 
+
+class Optimizers(FunctionNodes):
     def minimise(self, function=bowl, does="steps", **limits):
         return marrow.optimizer.steps(does=does).minimise(function, [0, 0], [0.5, 0.5], **limits)
 
@@ -101,74 +63,52 @@ class Optimizers(Written):
 
     def test_a_function_that_is_nowhere_finite_has_no_least_value(self):
         """By hand: the start, and in each of 14 rounds of halved steps four points around it (0.5^14 < 1e-4)."""
-        with self.assertRaisesRegex(
-            marrow.Error,
-            "the optimizer found no least value: the function is not finite at any of the 57 points that were tried",
-        ):
-            self.minimise(lambda x: numpy.nan)
+        text = "the optimizer found no least value: the function is not finite at any of the 57 points that were tried"
+        self.refuses((text, lambda: self.minimise(lambda x: numpy.nan)))
 
     def test_a_problem_that_makes_no_sense(self):
         for tolerance, text in ((numpy.nan, "nan"), (numpy.inf, "nan"), (-1, "-1"), (0, "0")):
-            with self.assertRaisesRegex(marrow.Error, "needs a positive, finite step_tolerance, got %s$" % text):
-                self.minimise(step_tolerance=tolerance)
-        with self.assertRaisesRegex(marrow.Error, "the optimizer got a start without coordinates; it needs one"):
-            marrow.optimizer.steps().minimise(bowl, [], [])
+            said = "needs a positive, finite step_tolerance, got %s$" % text
+            self.refuses((said, lambda: self.minimise(step_tolerance=tolerance)))
+        nowhere = lambda: marrow.optimizer.steps().minimise(bowl, [], [])
+        self.refuses(("the optimizer got a start without coordinates; it needs one", nowhere))
 
     def test_it_registers_with_a_cost(self):
-        self.plugin(
-            """
-@marrow.cost("similarity.near", summary="how far the model is from a place")
-def near():
-    return lambda poses: numpy.square(poses[:, :3, 3] - 3).sum(axis=1) + 1000 * numpy.square(
-        poses[:, :3, :3] - numpy.eye(3)).sum(axis=(1, 2))
-""",
-            "costs.py",
-        )
         found = marrow.register.multiresolution(
-            cost=marrow.similarity.near(), optimizer=marrow.optimizer.steps(), start=marrow.Pose(numpy.eye(4))
+            cost=marrow.similarity.near(), optimizer=marrow.optimizer.steps(), start=START
         )
         self.assertLess(numpy.abs(found.pose.matrix[:3, 3] - 3).max(), 0.1)
 
     def test_what_the_function_raises_is_raised_and_the_next_call_works(self):
-        def broken(x):
-            if x[0] > 0:
-                raise ValueError("no value here")
-            return bowl(x)
-
         with self.assertRaisesRegex(ValueError, "no value here"):
-            self.minimise(broken)
+            self.minimise(lambda x: broken(x) if x[0] > 0 else bowl(x))
         self.assertEqual(self.minimise().stopped_because, "the steps are short")
 
     def test_an_optimizer_that_swallows_all_exceptions_is_ended(self):
-        def broken(x):
-            raise ValueError("no value here")
-
         with self.assertRaisesRegex(ValueError, "no value here"):
             self.minimise(broken, does="swallow")
-        self.assertEqual(processes(self.file), [])
+        self.assertEqual(processes(self.optimizers), [])
 
     def test_what_it_may_not_do(self):
         for does, text in (
             ("nothing", r"optimizer.steps: it asked for no value of the function; call problem\(points\)"),
             ("silent", "optimizer.steps: it returned None; return in words why it ended"),
-            ("raise", "mine.py, line [0-9]+, in steps: ValueError: no way down"),
+            ("raise", "optimizers.py, line [0-9]+, in steps: ValueError: no way down"),
             ("nan", "the optimizer asked for the value of a point that is not finite"),
             ("other size", r"expected points of 2 numbers, \[N, 2\] or \[2\], got 1"),
-            ("crash", r"mine.py crashed its process \(Aborted\)"),
+            ("crash", r"optimizers.py crashed its process \(Aborted\)"),
         ):
-            with self.subTest(does), self.assertRaisesRegex(marrow.Error, text):
-                self.minimise(does=does)
-        with self.assertRaisesRegex(marrow.Error, "one positive initial step per coordinate"):
-            marrow.optimizer.steps().minimise(bowl, [0, 0], [1])
+            self.refuses((text, lambda: self.minimise(does=does)))
+        few_steps = lambda: marrow.optimizer.steps().minimise(bowl, [0, 0], [1])
+        self.refuses(("one positive initial step per coordinate", few_steps))
 
     def test_a_hang(self):
-        self.plugin(STEPS % 2)
+        self.optimizers_in(2)
         text = r"took longer than 2 s, and .* give it more in @marrow.optimizer\(..., seconds=...\)"
-        with self.assertRaisesRegex(marrow.Error, text):
-            self.minimise(does="hang")
+        self.refuses((text, lambda: self.minimise(does="hang")))
 
     def test_the_time_of_the_function_does_not_count(self):
-        self.plugin(STEPS % 5)
+        self.optimizers_in(5)
         asked = []
 
         def slow(x):
@@ -211,6 +151,77 @@ def near():
         )
 
 
+class Decorators(FunctionNodes):
+    """Of another optimizer, which registrations take too."""
+
+    def setUp(self):
+        super().setUp()
+        self.plain = marrow.optimizer.nelder_mead()
+
+    def test_a_registration_asks_a_cost_and_an_optimizer(self):
+        for cost, optimizer, place_mm in (
+            (marrow.similarity.near(), self.plain, 3),
+            (marrow.similarity.line(marrow.similarity.near(place_mm=-2), offset=5), None, -2),
+        ):
+            found = marrow.register.own(cost, optimizer or marrow.optimizer.thrice(self.plain), START).pose
+            self.assertLess(numpy.abs(found.matrix[:3, 3] - place_mm).max(), 0.01)
+
+    def test_a_node_in_cpp_that_it_calls_asks_them_too(self):
+        cost = marrow.similarity.near()
+        inside = marrow.register.own(cost, self.plain, START, by="multiresolution").pose
+        outside = marrow.register.multiresolution(cost=cost, optimizer=self.plain, start=START).pose
+        self.assertEqual(inside.matrix.tolist(), outside.matrix.tolist())
+
+    def test_it_starts_elsewhere(self):
+        def two_wells(x):  # the deeper one is to the right
+            return float(min((x[0] + 1) ** 2 + 1, 4 * (x[0] - 5) ** 2) + x[1] ** 2)
+
+        alone = self.plain.minimise(two_wells, [-1.5, 1], [1, 1])
+        self.assertLess(abs(alone.x[0] + 1), 0.01)
+        asked = []
+        decorated = marrow.optimizer.thrice(self.plain, apart=8)
+        found = decorated.minimise(lambda x: asked.append(x) or two_wells(x), [-1.5, 1], [1, 1])
+        self.assertLess(numpy.abs(found.x - [5, 0]).max(), 0.01)
+        self.assertIn("all three starts were tried; the last one: ", found.stopped_because)
+        self.assertEqual((found.value, found.evaluations), (two_wells(found.x), len(asked)))
+        self.assertGreater(found.evaluations, 2 * alone.evaluations)
+
+    def test_the_budget_ends_an_inner_minimisation(self):
+        found = marrow.optimizer.thrice(self.plain).minimise(
+            lambda x: float((x**2).sum()), [3.0, 1.0], [1, 1], max_evaluations=25
+        )
+        self.assertEqual((found.evaluations, found.stopped_because), (25, "the budget of 25 evaluations is spent"))
+
+    def test_a_problem_that_is_handed_on_is_the_same_problem(self):
+        found = []
+        for one in (self.plain, marrow.optimizer.thrice(self.plain, does="hand on")):
+            for limits in ({}, {"max_evaluations": 30}, {"lower": [-5, -1], "upper": [0.25, 5]}):
+                least = one.minimise(lambda x: float((x[0] - 1) ** 2 + (x[1] + 2) ** 2), [0, 0], [1, 1], **limits)
+                found.append((least.x.tolist(), least.value))
+        self.assertEqual(found[:3], found[3:])
+
+    def test_what_the_minimised_function_raises(self):
+        optimizer = marrow.optimizer.thrice(self.plain, does="hand on")
+        with self.assertRaisesRegex(ValueError, "no value here"):
+            optimizer.minimise(broken, [0], [1])
+        self.assertEqual(processes(self.optimizers), [])
+        self.assertLess(abs(optimizer.minimise(lambda x: float(x[0] ** 2), [1], [1]).x[0]), 1e-2)
+
+    def test_what_it_may_not_do(self):
+        for does, text in (
+            ("own", "optimizers.py, line [0-9]+, in <lambda>: ZeroDivisionError: division by zero"),
+            ("no start", "the optimizer got a start without coordinates; it needs one at least"),
+            ("exit", "optimizers.py ended its process"),
+            ("together", "two minimisations at the same time; run one after the other"),
+        ):
+            optimizer = marrow.optimizer.thrice(self.plain, does=does)
+            self.refuses((text, lambda: optimizer.minimise(lambda x: float(x[0] ** 2), [0.0], [1.0])))
+
+    def test_it_is_checked_as_any_other(self):
+        told = self.program("conformance", "optimizer.thrice", "--in", "optimizer=optimizer.nelder_mead")
+        self.assertIn("passed", told)
+
+
 class Problems(Written):
     def test_it_can_be_made_for_tests(self):
         problem = marrow.Problem(lambda points: (points**2).sum(axis=1), [1, 2], [1, 1], max_evaluations=4)
@@ -230,10 +241,9 @@ class Problems(Written):
             (([1], [1]), {"upper": [0]}, "the optimizer's start lies outside the bounds"),
             (([1], [1]), {"max_evaluations": 0}, "at least one evaluation, got max_evaluations = 0"),
         ):
-            with self.subTest(text), self.assertRaisesRegex(marrow.Error, text):
-                marrow.Problem(lambda points: points[:, 0], *arguments, **limits)
-        with self.assertRaisesRegex(marrow.Error, "the function gave 2 x 1 for 2 points"):
-            marrow.Problem(lambda points: points, [0], [1])([[0], [1]])
+            self.refuses((text, lambda: marrow.Problem(lambda points: points[:, 0], *arguments, **limits)))
+        wide = marrow.Problem(lambda points: points, [0], [1])
+        self.refuses(("the function gave 2 x 1 for 2 points", lambda: wide([[0], [1]])))
 
 
 if __name__ == "__main__":

@@ -3,15 +3,14 @@
 import inspect
 
 import numpy
-from harness.package import FEMUR, Case, main, marrow, small_case
+from harness.package import PackageCase, main, marrow
 
 
-class Nodes(Case):
+class Nodes(PackageCase):
     def test_a_node_gives_what_it_gives_in_a_pipeline(self):
-        folder, case = small_case()
-        pipeline = marrow.Pipeline(FEMUR, case=folder).set({"edges.uses": "edges.canny", "edges.noise_high": 8})
+        pipeline = self.pipeline.set({"edges.uses": "edges.canny", "edges.noise_high": 8})
         expected = pipeline.run(only=["edges"])["edges"]["lateral"].pixels
-        views = marrow.read.case(path=folder).views
+        views = marrow.read.case(path=self.folder).views
         self.assertTrue(numpy.array_equal(marrow.edges.canny(views["lateral"], noise_high=8).pixels, expected))
         self.assertTrue(
             numpy.array_equal(marrow.node("edges.canny")(view=views["lateral"], noise_high=8).pixels, expected)
@@ -19,12 +18,11 @@ class Nodes(Case):
         self.assertFalse(len(marrow.edges.canny(views["lateral"]).pixels) == len(expected))
 
     def test_a_list_means_one_call_for_each_item(self):
-        _, case = small_case()
-        edges = marrow.edges.canny(case.views)
+        edges = marrow.edges.canny(self.case.views)
         self.assertEqual((edges.axis, list(edges)), ("view", ["frontal", "lateral"]))
-        of_list = marrow.edges.canny([case.views["lateral"]])
+        of_list = marrow.edges.canny([self.case.views["lateral"]])
         self.assertTrue(numpy.array_equal(of_list["lateral"].pixels, edges["lateral"].pixels))
-        of_dict = marrow.edges.canny({"one": case.views["lateral"]})
+        of_dict = marrow.edges.canny({"one": self.case.views["lateral"]})
         self.assertEqual(list(of_dict), ["one"])
 
     def test_functions_go_from_node_to_node(self):
@@ -33,8 +31,7 @@ class Nodes(Case):
         self.assertEqual(marrow.test.apply(adder, marrow.test.constant(value=3))["value"], 5)
 
     def test_a_whole_pipeline_as_functions(self):
-        folder, _ = small_case()
-        case = marrow.read.case(path=folder)
+        case = marrow.read.case(path=self.folder)
         model = marrow.mesh.marching_cubes(marrow.segment.level_set(volume=case.ct, seeds=case.seeds))
         edges = marrow.edges.adaptive_relaxation(case.views, low=50, high=75)
         shaft = marrow.shaft.hough_pairs(edges=edges, view=case.views)
@@ -44,7 +41,7 @@ class Nodes(Case):
         found = marrow.register.multiresolution(
             cost=cost, optimizer=marrow.optimizer.levenberg_marquardt(), start=start
         )
-        expected = marrow.Pipeline(FEMUR, case=folder).run(only=["pose"], keep=False)["pose"]
+        expected = self.pipeline.run(only=["pose"], keep=False)["pose"]
         self.assertEqual(found.pose["distal"].matrix.tolist(), expected["distal"].matrix.tolist())
 
     def test_it_explains_itself(self):
@@ -66,52 +63,43 @@ class Nodes(Case):
         self.assertEqual(marrow.edges.__doc__, "edge pixels of an X-ray view")
 
     def test_wrong_calls(self):
-        _, case = small_case()
-        view = case.views["lateral"]
-        for call, text in (
+        view, canny = self.case.views["lateral"], marrow.edges.canny
+        unknown = "edges.canny has no input or option 'noise_hihg'; did you mean 'noise_high'?"
+        self.refuses(
+            (unknown, lambda: canny(view, noise_hihg=5)),
+            ("edges.canny takes 1 input, got 2; options are given by name", lambda: canny(view, 5)),
+            ("edges.canny: the input 'view' is given twice", lambda: canny(view, view=view)),
+            ("edges.canny needs the input 'view', of type view", canny),
+            ("input 'view': the list is empty", lambda: canny([])),
+            ("input 'view': expected view, got int", lambda: canny(7)),
+            ('expected a number, got the quoted text "much"', lambda: canny(view, noise_high="much")),
+            ("-1 is below the least allowed, 0", lambda: canny(view, noise_high=-1)),
+            ("low", lambda: canny(view, noise_low=9, noise_high=5)),
+            ("input 'view' of edges.canny expects view, got image", lambda: canny(view.image)),
             (
-                lambda: marrow.edges.canny(view, noise_hihg=5),
-                "edges.canny has no input or option 'noise_hihg'; did you mean 'noise_high'?",
-            ),
-            (lambda: marrow.edges.canny(view, 5), "edges.canny takes 1 input, got 2; options are given by name"),
-            (lambda: marrow.edges.canny(view, view=view), "edges.canny: the input 'view' is given twice"),
-            (lambda: marrow.edges.canny(), "edges.canny needs the input 'view', of type view"),
-            (lambda: marrow.edges.canny([]), "input 'view': the list is empty"),
-            (lambda: marrow.edges.canny(7), "input 'view': expected view, got int"),
-            (lambda: marrow.edges.canny(view, noise_high="much"), 'expected a number, got the quoted text "much"'),
-            (lambda: marrow.edges.canny(view, noise_high=-1), "-1 is below the least allowed, 0"),
-            (lambda: marrow.edges.canny(view, noise_low=9, noise_high=5), "low"),
-            (lambda: marrow.edges.canny(view.image), "input 'view' of edges.canny expects view, got image"),
-            (
-                lambda: marrow.edges.canny(view.image.array),
                 r"expected view, got ndarray; an array has no camera: give marrow.View\(array, camera\)",
+                lambda: canny(view.image.array),
             ),
             (
-                lambda: marrow.segment.threshold(case.ct.array),
                 r"an array has no spacing: give marrow.Volume\(array, spacing_mm=\(x, y, z\)\)",
+                lambda: marrow.segment.threshold(self.case.ct.array),
             ),
-            (lambda: marrow.node("edges.cany"), "unknown node 'edges.cany'; did you mean 'edges.canny'?"),
-        ):
-            with self.assertRaisesRegex(marrow.Error, text):
-                call()
-        with self.assertRaises(marrow.PipelineError) as caught:
-            marrow.edges.canny(view, noise_high=-1)
-        self.assertEqual((caught.exception.node, caught.exception.option), ("edges.canny", "noise_high"))
-        with self.assertRaises(marrow.PipelineError) as caught:
-            marrow.edges.canny(view.image)
-        self.assertEqual((caught.exception.node, caught.exception.port), ("edges.canny", "view"))
-        with self.assertRaisesRegex(AttributeError, "no node 'edges.cany'; did you mean 'canny'?"):
-            marrow.edges.cany
-        with self.assertRaisesRegex(
-            AttributeError, "marrow has no attribute or kind of nodes 'egdes'; did you mean 'edges'"
-        ):
-            marrow.egdes
+            ("unknown node 'edges.cany'; did you mean 'edges.canny'?", lambda: marrow.node("edges.cany")),
+        )
+        error = self.fault_of(lambda: canny(view, noise_high=-1))
+        self.assertEqual((error.node, error.option), ("edges.canny", "noise_high"))
+        error = self.fault_of(lambda: canny(view.image))
+        self.assertEqual((error.node, error.port), ("edges.canny", "view"))
+        self.refuses(
+            ("no node 'edges.cany'; did you mean 'canny'?", lambda: marrow.edges.cany),
+            ("marrow has no attribute or kind of nodes 'egdes'; did you mean 'edges'", lambda: marrow.egdes),
+            kind=AttributeError,
+        )
 
     def test_a_node_that_fails(self):
-        with self.assertRaises(marrow.RunError) as caught:
-            marrow.read.case(path="/nowhere")
-        self.assertEqual((caught.exception.node, caught.exception.file), ("read.case", None))
-        self.assertRegex(str(caught.exception), "^read.case failed: /nowhere: expected the folder of a case")
+        error = self.fault_of(lambda: marrow.read.case(path="/nowhere"), marrow.RunError)
+        self.assertEqual((error.node, error.file), ("read.case", None))
+        self.assertRegex(str(error), "^read.case failed: /nowhere: expected the folder of a case")
 
     def test_settings_of_a_call(self):
         draw = marrow.test.draw
@@ -120,8 +108,7 @@ class Nodes(Case):
         with self.assertRaisesRegex(marrow.Error, "threads: expected a whole number from 0 to 1024, got 1.5"):
             draw.using(threads=1.5)
         told = []
-        _, case = small_case()
-        marrow.edges.canny.using(progress=told.append)(case.views)
+        marrow.edges.canny.using(progress=told.append)(self.case.views)
         self.assertIn("finished", {event["event"] for event in told})
 
     def test_an_input_and_an_option_of_one_name(self):
@@ -132,7 +119,7 @@ class Nodes(Case):
         camera = marrow.Camera(8, 8, [[1000, 0, 4], [0, 1000, 4], [0, 0, 1]], numpy.eye(4))
         self.assertEqual(marrow.read.view(camera, image=image).view.image.width, 8)
         with self.assertRaisesRegex(marrow.PipelineError, "expects camera, got view"):
-            marrow.read.view(image="nowhere.png", camera=small_case()[1].views["frontal"])
+            marrow.read.view(image="nowhere.png", camera=self.case.views["frontal"])
         self.assertEqual(list(inspect.signature(marrow.read.view).parameters).count("camera"), 1)
 
     def test_several_outputs_are_a_named_tuple(self):

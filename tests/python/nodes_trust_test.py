@@ -6,12 +6,7 @@ import subprocess
 from harness.package import MARROW, main, marrow
 from written_nodes import Written, view
 
-NODE = """
-@marrow.node("own.value", summary="a value")
-def value(view: Annotated[marrow.View, "view"]) -> Annotated[marrow.Metrics, marrow.named("figures")]:
-    %s
-    return marrow.Metrics({"value": 5})
-"""
+THEIRS = "import sys\nsys.path.insert(0, %r)\n"
 
 
 class Trust(Written):
@@ -35,8 +30,7 @@ class Trust(Written):
         return subprocess.run([str(MARROW), "doctor"], capture_output=True, text=True, cwd=self.scratch).stdout
 
     def test_what_the_file_imports(self):
-        imports = "import sys\nsys.path.insert(0, %r)\nimport theirs\n" % str(self.open)
-        self.plugin(imports + NODE % "pass")
+        self.node(THEIRS % str(self.open) + "import theirs\nVALUE = 5")
         self.assertIn("module 'theirs' " + self.untrusted(self.open / "theirs.py"), self.doctor())
         self.assertFalse(self.mark.exists())
         self.open.chmod(0o755)  # as the message says
@@ -51,32 +45,23 @@ class Trust(Written):
         self.assertEqual(marrow.own.value(view())["value"], 5)
 
     def test_an_import_whose_error_is_caught(self):
-        self.plugin(
-            "import sys\nsys.path.insert(0, %r)\ntry:\n    import theirs\nexcept ImportError:\n    pass\n"
-            % str(self.open)
-            + NODE % "pass"
-        )
+        self.node(THEIRS % str(self.open) + "try:\n    import theirs\nexcept ImportError:\n    VALUE = 5\n")
         self.assertIn("module 'theirs' " + self.untrusted(self.open / "theirs.py"), self.doctor())
         self.assertFalse(self.mark.exists())
 
     def test_an_import_in_a_call(self):
-        self.plugin("import sys\nsys.path.insert(0, %r)\n" % str(self.open) + NODE % "import theirs")
-        with self.assertRaises(marrow.RunError) as caught:
-            marrow.own.value(view())
-        self.assertIn("module 'theirs' " + self.untrusted(self.open / "theirs.py"), str(caught.exception))
+        self.node(THEIRS % str(self.open), "import theirs\nVALUE = 5")
+        said = str(self.fault_of(lambda: marrow.own.value(view()), marrow.RunError))
+        self.assertIn("module 'theirs' " + self.untrusted(self.open / "theirs.py"), said)
         self.assertFalse(self.mark.exists())
 
     def test_a_folder_of_the_search_path(self):
         """The interpreter itself runs sitecustomize.py of such a folder."""
         (self.open / "theirs.py").rename(self.open / "sitecustomize.py")
-        os.environ["PYTHONPATH"], before = str(self.open), os.environ.get("PYTHONPATH")
-        try:
-            self.plugin(NODE % "pass")
+        with self.with_variables(PYTHONPATH=self.open):
+            self.node("VALUE = 5")
             self.assertIn(self.untrusted(self.open), self.doctor())
             self.assertFalse(self.mark.exists())
-        finally:
-            del os.environ["PYTHONPATH"]
-            os.environ.update({"PYTHONPATH": before} if before is not None else {})
 
 
 if __name__ == "__main__":

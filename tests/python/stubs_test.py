@@ -31,6 +31,7 @@ marrow.Pose([[1]]).matrx
 def members(node):
     """The public names that a class of a stub declares."""
     named = [one.name for one in node.body if isinstance(one, ast.FunctionDef)]
+    named += [one.target.id for one in node.body if isinstance(one, ast.AnnAssign)]
     return {name for name in named if not name.startswith("_")}
 
 

@@ -1,15 +1,23 @@
 # SPDX-License-Identifier: Apache-2.0
 """What the tests of nodes written in Python share: a folder of plugins, small views, and a camera."""
+import contextlib
 import os
 import pathlib
 import subprocess
 
 import numpy
-from harness.package import MARROW, SCRATCH, TEST_PLUGINS, Case, marrow
+from harness.package import MARROW, SCRATCH, TEST_PLUGINS, Refusing, marrow
 
 HEAD = """from typing import Annotated, NamedTuple, Optional
 import marrow
 import numpy
+"""
+VALUE_NODE = """
+%s
+@marrow.node("own.value", summary="a value")
+def value(view: Annotated[marrow.View, "view"]) -> Annotated[marrow.Metrics, marrow.named("figures")]:
+%s
+    return marrow.Metrics({"value": VALUE})
 """
 
 
@@ -41,7 +49,7 @@ def processes(file):
     return found
 
 
-class Written(Case):
+class Written(Refusing):
     """Each test has its own folder of plugins and cache of descriptions."""
 
     def setUp(self):
@@ -62,6 +70,30 @@ class Written(Case):
         file.write_text(HEAD + text)
         marrow.find_plugins_again()
         return file
+
+    def node(self, at_import="", in_call=""):
+        """A node that gives VALUE, which the code at the import of its file or in its call sets."""
+        return self.plugin(VALUE_NODE % (at_import, "".join("    %s\n" % line for line in in_call.splitlines())))
+
+    def module(self, place, text):
+        file = self.scratch / place
+        file.parent.mkdir(parents=True, exist_ok=True)
+        file.write_text(text)
+        return file
+
+    @contextlib.contextmanager
+    def with_variables(self, **variables):
+        """These variables, of which None is not set, for this process and those that it starts."""
+        before = dict(os.environ)
+        for name, text in variables.items():
+            os.environ.pop(name, None)
+            if text is not None:
+                os.environ[name] = str(text)
+        try:
+            yield
+        finally:
+            os.environ.clear()
+            os.environ.update(before)
 
     def found(self):
         """The value of the node own.value, and whether it was made again."""

@@ -147,12 +147,12 @@ def rows_of_record(run):
     return rows
 
 
-def main():
+def main(arguments=None):
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("run", type=pathlib.Path, help="folder of the run")
     parser.add_argument("--case", type=pathlib.Path, help="folder of the case, if it has moved since the run")
     parser.add_argument("--marrow", type=pathlib.Path, help="program that repeats the run with further outputs")
-    given = parser.parse_args()
+    given = parser.parse_args(arguments)
     run = Run(given.run, case=given.case)
     with tempfile.TemporaryDirectory(prefix="marrow-recompute-") as scratch:
         if given.marrow:

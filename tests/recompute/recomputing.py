@@ -1,16 +1,16 @@
 # SPDX-License-Identifier: Apache-2.0
 """What the tests here share: runs of shipped pipelines on small data, and the program that recomputes their figures."""
-import pathlib
+import contextlib
+import io
 import re
-import subprocess
 import sys
 
 from harness import MARROW, SOURCE, need_scipy
 from harness.program import marrow
 
-HERE = pathlib.Path(__file__).resolve().parent
 sys.dont_write_bytecode = True
-need_scipy()
+need_scipy()  # before the module below
+import recompute as program  # noqa: E402
 
 
 def run(folder, pipeline, *arguments):
@@ -22,9 +22,10 @@ def run(folder, pipeline, *arguments):
 
 def recompute(folder, *arguments):
     """(exit code, all that the program says)"""
-    command = [sys.executable, HERE / "recompute.py", folder, *arguments]
-    ended = subprocess.run([str(word) for word in command], capture_output=True, text=True, timeout=1200)
-    return ended.returncode, ended.stdout + ended.stderr
+    said = io.StringIO()
+    with contextlib.redirect_stdout(said):
+        code = program.main([str(word) for word in (folder, *arguments)])
+    return code, said.getvalue()
 
 
 def recompute_all(folder):

@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Classes (background, bone, metal, outside of the field) and borders of the femur in X-ray images: the network of
 edges.network and mask.network."""
-import json
 import pathlib
 
 import cv2
@@ -220,20 +219,16 @@ def run(arguments):
         planes[part] = planes_of(data, seeds[part])
     torch.manual_seed(arguments.seed)
     network = UNet(1, {"classes": Head(len(simulated.CLASSES)), "borders": Head(1)}, WIDTHS)
-    losses = training.train(
+    losses = training.train_as_told(
+        arguments,
         network,
         batches(planes["training"]),
         loss_of,
         lambda trained: liked(measured(trained, planes["choice"])),
-        steps=arguments.steps,
-        seed=arguments.seed,
-        out=out,
     )
     threshold = make_half_the_threshold(network, planes["choice"])
     figures = {part: measured(network, some[:120]).at(0.5) for part, some in planes.items()}
-    (out / "figures.json").write_text(json.dumps({"threshold": threshold, "losses": losses, **figures}, indent=1))
-    for part, found in figures.items():
-        print(part, "  ".join("%s %.3f" % item for item in found.items()))
+    training.tell(arguments, figures, threshold=threshold, losses=losses)
     made_by = "simulated femora of %d views each (marrow, tools/networks/train bones)" % arguments.views
     told = ", ".join("%s %.2f" % (name.replace("_", " "), value) for name, value in figures["judgement"].items())
     trained_on = "%d %s, %d steps of %d tiles; on %d other femora: %s" % (

@@ -2,7 +2,6 @@
 """Named points of a bone in X-ray images, as heat maps. The points are those that marrow places on the bone's surface,
 so a user's CT gives the same ones."""
 import dataclasses
-import json
 import pathlib
 import sys
 
@@ -312,18 +311,14 @@ def run(arguments):
     names = list(names_of(data, arguments.anatomy, simulated.SEEDS["training"][0]))
     torch.manual_seed(arguments.seed)
     network = new_network(names)
-    losses = training.train(
+    losses = training.train_as_told(
+        arguments,
         network,
         batches(views["training"]),
         loss_of,
         lambda trained: liked(measured(trained, views["choice"])),
-        steps=arguments.steps,
-        seed=arguments.seed,
-        out=out,
     )
     factor = measured(network, views["choice"]).factor()
     figures = {part: measured(network, some[:120]).figures(factor) for part, some in views.items()}
-    (out / "figures.json").write_text(json.dumps({"deviation_factor": factor, "losses": losses, **figures}, indent=1))
-    for part, found in figures.items():
-        print(part, "  ".join("%s %.3f" % item for item in found.items()))
+    training.tell(arguments, figures, deviation_factor=factor, losses=losses)
     export.write(network, card_of(arguments, names, factor, figures["judgement"]), out)

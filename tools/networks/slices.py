@@ -1,6 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
 """Where bone is in the slices of a CT: the network of segment.network. Bone counts as solid, with its marrow."""
-import json
 import pathlib
 
 import cv2
@@ -204,19 +203,15 @@ def run(arguments):
         scans[part] = scans_of(data, seeds)
     torch.manual_seed(arguments.seed)
     network = UNet(SLICES, {"classes": Head(1)}, widths=WIDTHS, limits=(-0.5, 2))
-    training.train(
+    training.train_as_told(
+        arguments,
         network,
         batches(scans["training"]),
         loss_of,
         lambda trained: measured(trained, scans["choice"])["dice"],
-        steps=arguments.steps,
-        seed=arguments.seed,
-        out=out,
     )
     figures = {part: measured(network, some[:16]) for part, some in scans.items()}
-    (out / "figures.json").write_text(json.dumps(figures, indent=1))
-    for part, found in figures.items():
-        print(part, "  ".join("%s %.3f" % item for item in found.items()))
+    training.tell(arguments, figures)
     trained_on = "%d simulated CTs of femora, pelves and vertebrae (marrow, tools/networks/train slices), %d steps" % (
         len(scans["training"]),
         arguments.steps,

@@ -6,7 +6,6 @@ file of marrow's lies beside the network.
 
     tools/networks/train surface femoral.stl --data runs/networks/femoral-data --out runs/networks/femoral
 """
-import json
 import pathlib
 
 import numpy as np
@@ -208,17 +207,7 @@ def run(arguments):
         figures = measured(trained, pictures["choice"], pixel_mm)
         return figures["dice"] + 0.5 * figures["points_found"]
 
-    losses = training.train(
-        network,
-        batches(sources["training"], pixel_mm),
-        loss_of,
-        judge,
-        steps=arguments.steps,
-        seed=arguments.seed,
-        out=out,
-    )
+    losses = training.train_as_told(arguments, network, batches(sources["training"], pixel_mm), loss_of, judge)
     figures = {part: measured(network, some, pixel_mm) for part, some in pictures.items()}
-    (out / "figures.json").write_text(json.dumps({"pixel_mm": pixel_mm, "losses": losses, **figures}, indent=1))
-    for part, found in figures.items():
-        print(part, "  ".join("%s %.3f" % item for item in found.items()))
+    training.tell(arguments, figures, pixel_mm=pixel_mm, losses=losses)
     export.write(network, card_of(arguments, name, list(points), pixel_mm, is_symmetric), out)

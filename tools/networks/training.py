@@ -2,6 +2,7 @@
 """The loop that trains a network. The same seed, steps and data give the same network on the same machine."""
 import json
 import math
+import pathlib
 import time
 
 import numpy as np
@@ -82,6 +83,20 @@ def train(network, batch, loss, judge, *, steps, seed, out, rate=3e-3, looks=10)
         network.load_state_dict(state["best_weights"])
     network.eval()
     return losses
+
+
+def train_as_told(arguments, network, batch, loss, judge):
+    """The same, with the seed, the steps and the folder of the command line."""
+    return train(
+        network, batch, loss, judge, steps=arguments.steps, seed=arguments.seed, out=pathlib.Path(arguments.out)
+    )
+
+
+def tell(arguments, figures, **more):
+    """Writes figures.json, with what else is to be kept, and prints the figures of each part."""
+    (pathlib.Path(arguments.out) / "figures.json").write_text(json.dumps({**more, **figures}, indent=1))
+    for part, found in figures.items():
+        print(part, "  ".join("%s %.3f" % item for item in found.items()))
 
 
 def settle(network, batch, seed):
