@@ -75,21 +75,14 @@ function upright(table) {
 
 // Figures of merit of a run, a table for each group of them.
 export const figures = (data) => data.figures.map(upright).map(
-    (table) =>
-        el('div', {class: 'scroll'},
-           el('table', {class: 'figures'}, el('caption', {}, table.name),
-              el('thead', {},
-                 el('tr', {}, el('th', {scope: 'col'}, 'Figure'),
-                    table.columns.map((column) => el('th', {scope: 'col', class: 'number'}, column)),
-                    el('th', {scope: 'col'}, 'Unit'))),
-              el('tbody', {},
-                 table.rows.map(
-                     (row) => el(
-                         'tr', {}, el('th', {scope: 'row'}, Glossary.term(row.name)),
-                         table.columns.map(
-                             (_, i) => el(
-                                 'td', {class: 'number'}, Number.isFinite(row.values[i]) ? number(row.values[i]) : '')),
-                         el('td', {}, row.unit)))))));
+    (table) => Dom.table(
+        {class: 'figures'}, table.name,
+        ['Figure', ...table.columns.map((column) => [column, {class: 'number'}]), 'Unit'], table.rows.map((row) => {
+          const values = table.columns.map((_, i) => (Number.isFinite(row.values[i]) ? number(row.values[i]) : ''));
+          const line = Dom.row(Glossary.term(row.name), values, {class: 'number'});
+          line.append(el('td', {}, row.unit));
+          return line;
+        })));
 
 function options(variant) {
   const entries = Object.entries(variant.options);

@@ -88,13 +88,35 @@ export function slider(label, value, changed) {
   return labelled(label, box);
 }
 
+// A row of a table: its name and cells. `attributes` are those of each cell.
+export const row = (name, cells, attributes) =>
+    el('tr', {}, el('th', {scope: 'row'}, name), cells.map((cell) => el('td', attributes, cell)));
+
 // A table of names and values.
-export const valueTable = (entries) => el(
-    'table', {class: 'values'},
-    el('tbody', {}, entries.map(([name, value]) => el('tr', {}, el('th', {scope: 'row'}, name), el('td', {}, value)))));
+export const valueTable = (entries) =>
+    el('table', {class: 'values'}, el('tbody', {}, entries.map(([name, value]) => row(name, [value]))));
+
+// A table in a box that scrolls. head: titles, as texts or [text, attributes]; it and the caption may be null.
+export const table = (attributes, caption, head, rows) =>
+    el('div', {class: 'scroll'},
+       el('table', attributes, caption && el('caption', {}, caption),
+          head && el('thead', {}, el('tr', {}, head.map((title) => {
+                       const [text, more] = [title].flat();
+                       return el('th', {scope: 'col', ...more}, text);
+                     }))),
+          el('tbody', {}, rows)));
 
 export const button = (text, pressed, attributes) =>
     el('button', {type: 'button', onclick: pressed, ...attributes}, text);
+
+// A form that calls submitted() instead of leaving the page.
+export function form(attributes, submitted, ...children) {
+  const onsubmit = (event) => {
+    event.preventDefault();
+    submitted();
+  };
+  return el('form', {...attributes, onsubmit}, ...children);
+}
 
 // A command for a shell, with a button that copies it. Opened from disk, a page may lack the clipboard's API.
 export function command(text) {
@@ -110,6 +132,20 @@ export function command(text) {
     setTimeout(() => (copy.textContent = 'Copy'), 1500);
   });
   return el('div', {class: 'command'}, el('pre', {tabindex: 0}, code), copy);
+}
+
+// Calls moved(percent) with the place of a pointer that is dragged over an element, from its left to its right.
+export function dragAcross(element, moved) {
+  const follow = (event) => {
+    if (!(event.buttons & 1)) return;
+    const area = element.getBoundingClientRect();
+    moved(Math.max(0, Math.min(100, 100 * (event.clientX - area.left) / area.width)));
+  };
+  element.addEventListener('pointerdown', (event) => {
+    element.setPointerCapture(event.pointerId);
+    follow(event);
+  });
+  element.addEventListener('pointermove', follow);
 }
 
 // Saves a text as a file in the browser's folder for downloads.

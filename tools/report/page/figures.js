@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The figures over all cells: distributions, differences to the baseline, success against the distance of the start.
 import * as Data from './data.js';
-import {el, number, percent, svg, withUnit} from './dom.js';
+import {el, number, percent, svg, table, withUnit} from './dom.js';
 import * as Plots from './plots.js';
 
 const MOST_POINTS = 400;
@@ -258,21 +258,17 @@ export function drawCapture(data, bins, width) {
 
 export function captureTable(data, bins) {
   const used = bins[0].map((_, bin) => bin).filter((bin) => bins.some((row) => row[bin].of));
-  return el(
-      'div', {class: 'scroll'},
-      el('table', {class: 'counts cards', role: 'table'},
-         el('thead', {},
-            el('tr', {},
-               el('th', {scope: 'col'}, 'Start' + (data.initial_error.unit ? ', ' + data.initial_error.unit : '')),
-               data.variants.map((variant) => el('th', {scope: 'col', class: 'number'}, variant.name)))),
-         el('tbody', {},
-            used.map(
-                (bin) =>
-                    el('tr', {}, el('th', {scope: 'row'}, bins[0][bin].from + '–' + bins[0][bin].to),
-                       bins.map(
-                           (row, i) => el(
-                               'td', {class: 'number', 'data-title': data.variants[i].name},
-                               row[bin].of ? row[bin].count + ' / ' + row[bin].of : '–', ' ',
-                               row[bin].of ? el('small', {}, percent(row[bin].low) + ' to ' + percent(row[bin].high)) :
-                                             '')))))));
+  const cell = (one, i) =>
+      el('td', {class: 'number', 'data-title': data.variants[i].name}, one.of ? one.count + ' / ' + one.of : '–', ' ',
+         one.of ? el('small', {}, percent(one.low) + ' to ' + percent(one.high)) : '');
+  return table(
+      {class: 'counts cards', role: 'table'}, null,
+      [
+        'Start' + (data.initial_error.unit ? ', ' + data.initial_error.unit : ''),
+        ...data.variants.map((variant) => [variant.name, {class: 'number'}])
+      ],
+      used.map(
+          (bin) =>
+              el('tr', {}, el('th', {scope: 'row'}, bins[0][bin].from + '–' + bins[0][bin].to),
+                 bins.map((row, i) => cell(row[bin], i)))));
 }

@@ -7,7 +7,7 @@ import {monotoneY} from 'd3-shape/src/curve/monotone.js';
 import line from 'd3-shape/src/line.js';
 import * as Dagre from 'dagre';
 
-import {button, el, svg} from './dom.js';
+import {button, el, row, svg, table} from './dom.js';
 
 const BOX = {
   width: 186,
@@ -141,19 +141,13 @@ function drawNode({node, x, y, height}, chosen) {
 }
 
 function about(node) {
-  const row = (name, value) =>
-      el('tr', {}, el('th', {scope: 'row'}, name),
-         el('td', {}, el('code', {}, typeof value === 'string' ? value : JSON.stringify(value))));
+  const rows = (entries) => entries.map(
+      ([name, value]) => row(name, [el('code', {}, typeof value === 'string' ? value : JSON.stringify(value))]));
   const options = Object.entries(node.options || {}), differs = Object.entries(node.differs || {});
   return [
     el('h3', {}, node.id, ' ', el('code', {}, node.uses)),
-    differs.length > 0 &&
-        el('div', {class: 'scroll'},
-           el('table', {}, el('caption', {}, 'What differs'),
-              el('tbody', {}, differs.map(([name, text]) => row(name, text))))),
-    el('div', {class: 'scroll'},
-       el('table', {}, el('caption', {}, options.length ? 'Options' : 'No options given: all at their defaults'),
-          el('tbody', {}, options.map(([name, value]) => row(name, value)))))
+    differs.length > 0 && table({}, 'What differs', null, rows(differs)),
+    table({}, options.length ? 'Options' : 'No options given: all at their defaults', null, rows(options))
   ].filter(Boolean);
 }
 

@@ -280,13 +280,9 @@ function repeat(data) {
       file('The pipeline’s file', experiment.pipeline_text), ...Recipes.all(data),
       (experiment.plugins || []).length > 0 &&
           el('details', {}, el('summary', {}, 'Plugins and their build ids'),
-             el('div', {class: 'scroll'},
-                el('table', {},
-                   el('tbody', {},
-                      experiment.plugins.map(
-                          (plugin) =>
-                              el('tr', {}, el('th', {scope: 'row'}, plugin.file),
-                                 el('td', {}, el('code', {}, plugin.build_id)))))))));
+             Dom.table(
+                 {}, null, null,
+                 experiment.plugins.map((plugin) => Dom.row(plugin.file, [el('code', {}, plugin.build_id)])))));
 }
 
 function summary(data) {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Sequences compared over time: both curves of each figure, the difference beneath, and its statistics. The data are
 // those of curves.json, whose keys docs/comparing.md lists.
+import * as Dom from './dom.js';
 import {el, number, percent, svg, withUnit} from './dom.js';
 import * as Plots from './plots.js';
 
@@ -98,10 +99,9 @@ const COLUMNS = {
   ]
 };
 
-const table = (figures, columns) => el(
-    'div', {class: 'scroll'},
-    el('table', {}, el('thead', {}, el('tr', {}, columns.map(([title]) => el('th', {scope: 'col'}, title)))),
-       el('tbody', {}, figures.map((figure) => el('tr', {}, columns.map(([, text]) => el('td', {}, text(figure))))))));
+const table = (figures, columns) => Dom.table(
+    {}, null, columns.map(([title]) => title),
+    figures.map((figure) => el('tr', {}, columns.map(([, text]) => el('td', {}, text(figure))))));
 
 const NOTES = {
   sequences: 'Differences are second − first. Beneath each pair of curves is the difference; its band holds 95 % ' +

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The bodies that a run repeated: a line for each pass; failed passes come first, in words.
+import * as Dom from './dom.js';
 import {el, withUnit} from './dom.js';
 
 const isDone = (pass) => pass.status === 'done';
@@ -13,17 +14,12 @@ function summary({node, passes, end}) {
       (end ? '; ended because ' + end : '');
 }
 
-const table = (entry) =>
-    el('div', {class: 'scroll'},
-       el('table', {class: 'figures'},
-          el('thead', {},
-             el('tr', {}, el('th', {scope: 'col'}, 'Pass'), el('th', {scope: 'col'}, 'Status'),
-                el('th', {scope: 'col', class: 'number'}, 'Time'), el('th', {scope: 'col'}, 'Reason'))),
-          el('tbody', {},
-             entry.passes.map(
-                 (pass) =>
-                     el('tr', {}, el('th', {scope: 'row'}, pass.name), el('td', {}, pass.status),
-                        el('td', {class: 'number'}, withUnit(pass.seconds, 's')), el('td', {}, pass.reason || ''))))));
+const table = (entry) => Dom.table(
+    {class: 'figures'}, null, ['Pass', 'Status', ['Time', {class: 'number'}], 'Reason'],
+    entry.passes.map(
+        (pass) =>
+            el('tr', {}, el('th', {scope: 'row'}, pass.name), el('td', {}, pass.status),
+               el('td', {class: 'number'}, withUnit(pass.seconds, 's')), el('td', {}, pass.reason || ''))));
 
 export const draw = (data) => data.passes.map(
     (entry) =>

@@ -111,16 +111,7 @@ export class Comparer {
   }
 
   listen() {
-    const drag = (event) => {
-      if (this.mode !== 'wipe' || !(event.buttons & 1)) return;
-      const area = this.stage.getBoundingClientRect();
-      this.setWipe(100 * (event.clientX - area.left) / area.width);
-    };
-    this.stage.addEventListener('pointerdown', (event) => {
-      this.stage.setPointerCapture(event.pointerId);
-      drag(event);
-    });
-    this.stage.addEventListener('pointermove', drag);
+    Dom.dragAcross(this.stage, (percent) => this.mode === 'wipe' && this.setWipe(percent));
     this.stage.addEventListener('keydown', (event) => {
       const step = {ArrowLeft: -2, ArrowRight: 2, PageDown: -10, PageUp: 10, Home: -100, End: 100}[event.key];
       if (this.mode === 'wipe' && step)

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Where the time of a run went: a flame graph with a row for each thread, how busy the threads were, and a table of the
 // steps that took longest. A click on a bar shows its time alone.
+import * as Dom from './dom.js';
 import {button, el, number, percent, svg, withUnit} from './dom.js';
 import * as Plots from './plots.js';
 
@@ -130,24 +131,23 @@ const nameOf = ({node, what}) => (node && what ? node + ': ' + what : node || wh
 function table(profile) {
   const steps = profile.sums.filter((one) => one.kind !== 'pass').sort((a, b) => b.own_us - a.own_us);
   const all = steps.reduce((sum, one) => sum + one.own_us, 0);
-  const head = (title, tip) => el('th', {scope: 'col', class: 'number', 'data-tip': tip}, title);
-  return el(
-      'div', {class: 'scroll'},
-      el('table', {class: 'figures slowest'},
-         el('caption', {}, 'The steps that took longest' + (steps.length > STEPS ? ', of ' + steps.length : '')),
-         el('thead', {},
-            el('tr', {}, el('th', {scope: 'col'}, 'Step'), head('Calls'),
-               head('Own time', 'Without what it called on the same thread.'),
-               head('Share', 'Of the own time of all steps.'),
-               head('Processor time', 'Of the thread that made the calls, without what it called.'),
-               head('Busy', 'Processors busy meanwhile, whatever ran on them.'))),
-         el('tbody', {},
-            steps.slice(0, STEPS).map(
-                (one) => el(
-                    'tr', {}, el('th', {scope: 'row'}, nameOf(one) + (one.kind === 'cached' ? ' (kept result)' : '')), [
-                      String(one.calls), seconds(one.own_us), percent(one.own_us / all), seconds(one.own_thread_us),
-                      number(one.process_us / one.us)
-                    ].map((text) => el('td', {class: 'number'}, text)))))));
+  const head = (title, tip) => [title, {class: 'number', 'data-tip': tip}];
+  return Dom.table(
+      {class: 'figures slowest'}, 'The steps that took longest' + (steps.length > STEPS ? ', of ' + steps.length : ''),
+      [
+        'Step', head('Calls'), head('Own time', 'Without what it called on the same thread.'),
+        head('Share', 'Of the own time of all steps.'),
+        head('Processor time', 'Of the thread that made the calls, without what it called.'),
+        head('Busy', 'Processors busy meanwhile, whatever ran on them.')
+      ],
+      steps.slice(0, STEPS).map(
+          (one) => Dom.row(
+              nameOf(one) + (one.kind === 'cached' ? ' (kept result)' : ''),
+              [
+                String(one.calls), seconds(one.own_us), percent(one.own_us / all), seconds(one.own_thread_us),
+                number(one.process_us / one.us)
+              ],
+              {class: 'number'})));
 }
 
 // The flame graph with its controls, and the table.

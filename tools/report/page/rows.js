@@ -20,16 +20,26 @@ export function order(items, key, down) {
   return Uint32Array.from(keys.keys()).sort((a, b) => sizes[a] - sizes[b] || a - b);
 }
 
+// The head of a column that sorts when it is pressed.
+export const sortHead = (column, pressed, attributes) => el(
+    'th',
+    {scope: 'col', class: column.number ? 'number' : null, 'data-tip': Glossary.meaning(column.title), ...attributes},
+    Dom.button(
+        [column.title, column.unit && el('small', {}, ' ' + column.unit)].filter(Boolean), pressed, {class: 'sort'}));
+
+// Tells by which of these heads the rows are sorted.
+export const markSorted = (heads, sorted, down) => heads.forEach(
+    (head, i) => head.setAttribute(
+        'aria-sort',
+        sorted !== i ? 'none' :
+            down     ? 'descending' :
+                       'ascending'));
+
 // columns: [{title, unit, number (bool), width (in digits), cell(item)}]; the first cell of a row holds its button.
 export class Table {
   constructor(label, columns, {attributes, sort, open}) {
     Object.assign(this, {columns, attributes, open, items: [], drawn: new Map(), current: 0});
-    this.heads = columns.map(
-        (column, i) =>
-            el('th', {scope: 'col', class: column.number ? 'number' : null, 'data-tip': Glossary.meaning(column.title)},
-               Dom.button(
-                   [column.title, column.unit && el('small', {}, ' ' + column.unit)].filter(Boolean), () => sort(i),
-                   {class: 'sort'})));
+    this.heads = columns.map((column, i) => sortHead(column, () => sort(i)));
     this.body = el('tbody', {
       onclick: (event) => this.click(event),
       onfocusin: (event) => this.makeCurrent(this.numberOf(event.target.closest('tr')))
@@ -59,12 +69,7 @@ export class Table {
   show(items, sorted, down) {
     this.items = items;
     this.current = 0;
-    this.heads.forEach(
-        (head, i) => head.setAttribute(
-            'aria-sort',
-            sorted !== i ? 'none' :
-                down     ? 'descending' :
-                           'ascending'));
+    markSorted(this.heads, sorted, down);
     this.table.setAttribute('aria-rowcount', items.length + 1);
     this.drawn.clear();
     this.body.replaceChildren();

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // The head of the page: what was compared, and each result as a sentence. Tables whose columns sort, for all sections.
 import * as Data from './data.js';
-import {button, el, number, percent, select} from './dom.js';
-import * as Glossary from './glossary.js';
+import {el, number, percent, select} from './dom.js';
 import * as Plots from './plots.js';
+import * as Rows from './rows.js';
 
 const plural = (count, word) => count + ' ' + word + (count === 1 ? '' : 's');
 
@@ -52,29 +52,17 @@ export function sortable(rows, all, state, caption) {
       (typeof a === 'string' ? a.localeCompare(b, undefined, {numeric: true}) :
                                (Number.isFinite(a) ? a : Infinity) - (Number.isFinite(b) ? b : Infinity) || 0);
   const body = el('tbody', {role: 'rowgroup'});
-  const heads = all.map(
-      (column, i) =>
-          el('th', {
-            scope: 'col',
-            role: 'columnheader',
-            class: column.number ? 'number' : null,
-            'data-tip': Glossary.meaning(column.title)
-          },
-             button([column.title, column.unit && el('small', {}, ' ' + column.unit)].filter(Boolean), () => {
-               state.down = state.column === i ? !state.down : false;
-               state.column = i;
-               fill();
-             }, {class: 'sort'})));
+  const sort = (i) => {
+    state.down = state.column === i ? !state.down : false;
+    state.column = i;
+    fill();
+  };
+  const heads = all.map((column, i) => Rows.sortHead(column, () => sort(i), {role: 'columnheader'}));
   const fill = () => {
     const sorted = [...rows];
     if (state.column !== undefined)
       sorted.sort((a, b) => (state.down ? -1 : 1) * compare(all[state.column].key(a), all[state.column].key(b)));
-    heads.forEach(
-        (head, i) => head.setAttribute(
-            'aria-sort',
-            state.column !== i ? 'none' :
-                state.down     ? 'descending' :
-                                 'ascending'));
+    Rows.markSorted(heads, state.column, state.down);
     body.replaceChildren(
         ...sorted.map((row) => el('tr', {'data-row': row, role: 'row'}, all.map((column) => {
                         const kind = [column.number && 'number', column.wide && 'wide'].filter(Boolean).join(' ');

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The verdict on a pose: the judgement, its reasons, what would settle it, the overlays and the pose.
-import {el, number, percent} from './dom.js';
+import * as Dom from './dom.js';
+import {el, number, percent, row} from './dom.js';
 import * as Glossary from './glossary.js';
 import * as Summary from './summary.js';
 
@@ -38,23 +39,17 @@ function overlays(cell, item) {
 
 function pose(entry) {
   const {matrix, deviations} = entry;
-  const rows = [0, 1, 2].map(
-      (row) =>
-          el('tr', {}, el('th', {scope: 'row'}, 'xyz'[row]),
-             [0, 1, 2, 3].map(
-                 (column) =>
-                     el('td', {class: 'number'},
-                        matrix[4 * row + column].toFixed(column < 3 ? 5 : 2) + (column < 3 ? '' : ' mm')))));
+  const cell = (value, column) => value.toFixed(column < 3 ? 5 : 2) + (column < 3 ? '' : ' mm');
+  const rows = [0, 1, 2].map((i) => row('xyz'[i], matrix.slice(4 * i, 4 * i + 4).map(cell), {class: 'number'}));
   const text = (from, unit) => deviations.slice(from, from + 3).map((value) => number(value)).join(', ') + unit;
-  return el(
-      'div', {class: 'scroll'},
-      el('table', {class: 'values pose'}, el('caption', {}, entry.name + ': ' + entry.target + '_from_' + entry.source),
-         el('tbody', {}, rows)),
-      deviations &&
-          el('p', {class: 'note'},
-             'Predicted standard deviations about and along the ' +
-                 (entry.has_bone_axes ? 'frontal, lateral and long' : 'x, y and z') + ' axes: ' + text(0, ' deg') +
-                 '; ' + text(3, ' mm')));
+  const box = Dom.table({class: 'values pose'}, entry.name + ': ' + entry.target + '_from_' + entry.source, null, rows);
+  if (deviations)
+    box.append(
+        el('p', {class: 'note'},
+           'Predicted standard deviations about and along the ' +
+               (entry.has_bone_axes ? 'frontal, lateral and long' : 'x, y and z') + ' axes: ' + text(0, ' deg') + '; ' +
+               text(3, ' mm')));
+  return box;
 }
 
 // The judgement, its reasons, and what would settle it.

@@ -12,12 +12,13 @@ const keys = [
   ['Ctrl+z', 'undo', () => draft.step('undo')], ['Ctrl+y or Ctrl+Z', 'redo', () => draft.step('redo')],
   ['1 or 2 or 3 or 4 or 5', 'a step of the rail', (event) => rail.choose(CaseSteps.STEPS[Number(event.key) - 1].name)]
 ];
-let draft = null, open = [], rail = null;
+let draft = null, open = [], rail = null, leaving = null;
 
-// Adds a panel. make(draft) returns {element, update(), dispose(), tools, stage}; update() is called after each change
-// of the draft. `tools`: further parts for the rail's steps, [{step, title, element}]; without `element` the panel has
-// only these. `stage`: its pictures, {slices | surfaces | xrays: element}. Panels with a smaller `order`
-// come first. `more_keys` are as in Shell.page().
+// Adds a panel. make(draft, left) returns {element, update(), dispose(), tools, stage}; `left` is a signal that ends
+// when the page is left, for the panel's listeners; update() is called after each change of the draft. `tools`: further
+// parts for the rail's steps, [{step, title, element}]; without `element` the panel has only these. `stage`: its
+// pictures, {slices | surfaces | xrays: element}. Panels with a smaller `order` come first. `more_keys` are as in
+// Shell.page().
 export function panel(title, step, order, make, more_keys = []) {
   panels.push({title, step, order, make});
   panels.sort((a, b) => a.order - b.order);
@@ -48,7 +49,8 @@ function toolsOf(parts) {
 async function show(place, parameters, first) {
   draft = await CaseDraft.open(first || 'case');
   const head = bar();
-  open = panels.map(({title, step, make}) => ({title, step, ...make(draft)}));
+  leaving = new AbortController();
+  open = panels.map(({title, step, make}) => ({title, step, ...make(draft, leaving.signal)}));
   const parts =
       open.flatMap(({title, step, element, tools = []}) => [...(element ? [{title, step, element}] : []), ...tools]);
   const tools = toolsOf(parts), shown = Object.assign({}, ...open.map((one) => one.stage || {}));
@@ -75,6 +77,7 @@ Shell.page('case', {
   title: 'Case',
   show,
   leave() {
+    if (leaving) leaving.abort();
     open.forEach((one) => one.dispose && one.dispose());
     open = [];
   },

@@ -25,16 +25,8 @@ export function ago(text) {
 // The paths that the pages use: the opened folder itself is '.'.
 const known = (paths) => paths.map((path) => path || '.');
 
-// A name for a new case that is still free: case, case-2, ...
-function freeName(taken) {
-  for (let number = 1;; ++number) {
-    const name = number === 1 ? 'case' : 'case-' + number;
-    if (!taken.includes(name)) return name;
-  }
-}
-
 function faultOfName(name, taken) {
-  if (!name) return 'Give the case a name, such as ' + freeName(taken) + '.';
+  if (!name) return 'Give the case a name, such as ' + Shell.freeName('case', taken) + '.';
   if (name.startsWith('/') || name.split('/').some((part) => part.startsWith('.')))
     return 'A name is a folder below this one, such as cases/7, and no part of it begins with a dot.';
   return taken.includes(name) ? 'There is a case ' + name + ' already. Give another name, or open that one.' : '';
@@ -44,7 +36,8 @@ function faultOfName(name, taken) {
 async function begin(taken) {
   const name = await Shell.dialog('New case', (close) => {
     const fault = el('p', {class: 'reason', role: 'alert', hidden: true});
-    const box = el('input', {type: 'text', value: freeName(taken), 'data-do': 'name', spellcheck: 'false'});
+    const box =
+        el('input', {type: 'text', value: Shell.freeName('case', taken), 'data-do': 'name', spellcheck: 'false'});
     const make = () => {
       const given = box.value.trim().replace(/\/+$/, ''), text = faultOfName(given, taken);
       fault.hidden = !text;
@@ -52,14 +45,8 @@ async function begin(taken) {
       if (!text) close(given);
     };
     setTimeout(() => box.select());
-    return el(
-        'form', {
-          onsubmit: (event) => {
-            event.preventDefault();
-            make();
-          }
-        },
-        Dom.labelled('Name: the folder that holds the case', box), fault,
+    return Dom.form(
+        {}, make, Dom.labelled('Name: the folder that holds the case', box), fault,
         el('p', {class: 'note'},
            'Nothing is written there before you save. Until then each change is kept as a draft.'),
         el('div', {class: 'toolbar'}, el('button', {type: 'submit', class: 'primary', 'data-do': 'make'}, 'Begin')));
@@ -68,18 +55,14 @@ async function begin(taken) {
 }
 
 async function throwAway(draft, again) {
-  const sure = await Shell.dialog(
-      'Throw the draft away?',
-      (close) => el(
-          'div', {},
-          el('p', {},
-             draft.fault ? 'The draft of ' + draft.case +' cannot be opened. It is lost then.' :
-                           'The changes of ' + draft.case +' that are not saved are lost then: ' + draft.changes + '.'),
-          el('p', {class: 'note'}, 'What was saved in the case\'s folder stays.'),
-          el('div', {class: 'toolbar'},
-             Dom.button('Throw it away', () => close(true), {class: 'danger', 'data-do': 'throw-away'}),
-             Dom.button('Keep it', () => close(false)))));
-  if (!sure) return;
+  const content = [
+    el('p', {},
+       draft.fault ? 'The draft of ' + draft.case +' cannot be opened. It is lost then.' :
+                     'The changes of ' + draft.case +' that are not saved are lost then: ' + draft.changes + '.'),
+    el('p', {class: 'note'}, 'What was saved in the case\'s folder stays.')
+  ];
+  const yes = ['Throw it away', {class: 'danger', 'data-do': 'throw-away'}];
+  if (!await Shell.sure('Throw the draft away?', content, yes, ['Keep it'])) return;
   await Shell.guarded(() => Ask.post('api/draft/throw-away', {case: draft.case}));
   again();
 }

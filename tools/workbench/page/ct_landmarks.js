@@ -86,7 +86,7 @@ function rowOf(draft, state, landmark) {
                  el('p', {class: 'note'}, 'Not in the CT yet.'));
 }
 
-function make(draft) {
+function make(draft, left) {
   const state = CtState.of(draft), list = el('ul', {class: 'fragments'});
   const add = PointList.nameField(
       'new landmark', 'Add', () => landmarks(draft).map(({name}) => name),
@@ -100,8 +100,7 @@ function make(draft) {
            Boolean(state.ct)],
       () => landmarks(draft).map((landmark) => rowOf(draft, state, landmark)));
   state.marks.set('landmarks', () => marks(draft, state));
-  state.addEventListener('ct', update);
-  state.addEventListener('view', update);
+  for (const name of ['ct', 'view']) state.addEventListener(name, update, {signal: left});
   return {
     element:
         el('div', {},
@@ -109,11 +108,7 @@ function make(draft) {
               'Points that can be found in the CT and in the X-rays. They give a start to the ' +
                   'registration.'),
            add, list),
-    update,
-    dispose() {
-      state.removeEventListener('ct', update);
-      state.removeEventListener('view', update);
-    }
+    update
   };
 }
 

@@ -47,15 +47,9 @@ function optionsForm(changed) {
     box(series).value = series_uid;
     fault.textContent = '';
   }
-  const form =
-      el('form', {
-        class: 'toolbar',
-        onsubmit: (event) => {
-          event.preventDefault();
-          read();
-        }
-      },
-         sizes, flips, offset, series, fault, el('button', {type: 'submit', 'data-do': 'read-ct'}, 'Read again'));
+  const form = Dom.form(
+      {class: 'toolbar'}, read, sizes, flips, offset, series, fault,
+      el('button', {type: 'submit', 'data-do': 'read-ct'}, 'Read again'));
   const element =
       el('details', {class: 'ct-options'}, el('summary', {}, 'How it is read'),
          el('p', {class: 'note'}, 'Needed only if its files do not say it, or are wrong.'), form);
@@ -63,13 +57,13 @@ function optionsForm(changed) {
 }
 
 async function choose(draft) {
-  const file = await Shell.choose(
-      'Choose a CT: a file, or the folder of a DICOM series',
-      {folders: true, accepts: (name) => VOLUME.test(name), at: startOf(draft)});
+  const file = await Shell.choose('Choose a CT: a file, or the folder of a DICOM series', {
+    folders: true,
+    accepts: (name) => VOLUME.test(name),
+    at: Shell.folderOf(draft.document.ct ? draft.document.ct.file : '')
+  });
   if (file !== undefined) draft.change('choose the CT ' + file, (document) => (document.ct = {file}));
 }
-// The chooser begins in the folder of the present CT.
-const startOf = ({document: {ct}}) => (ct ? ct.file.split('/').slice(0, -1).join('/') : '');
 
 // A button for each series of the folder, if the fault lists them.
 const seriesIn = (draft, fault) => [...fault.matchAll(/^ +(\d+(?:\.\d+)+) \((.*)\)$/gm)].map(
@@ -167,7 +161,7 @@ const slicesHelp = () =>
            'zooms. Drag with the right button for the window, with Shift to move the picture. Two fingers zoom. ',
        el('kbd', {}, '?'), ' lists the keys.');
 
-function make(draft) {
+function make(draft, left) {
   const state = CtState.of(draft), shown = slices(draft, state);
   const name = el('strong', {'data-ct': ''}), help = slicesHelp(), facts = el('span', {class: 'note'}),
         says = el('div', {});
@@ -208,9 +202,9 @@ function make(draft) {
     if (ct) shown.update();
   }
   const viewed = () => state.ct && shown.update();
-  state.addEventListener('ct', tell);
-  state.addEventListener('view', viewed);
-  state.addEventListener('slice', shown.values.update);
+  state.addEventListener('ct', tell, {signal: left});
+  state.addEventListener('view', viewed, {signal: left});
+  state.addEventListener('slice', shown.values.update, {signal: left});
   options.fill(draft.document.ct);
   tell();
   let filled = JSON.stringify(draft.document.ct);
@@ -224,12 +218,7 @@ function make(draft) {
       if (now === state.read) return viewed();
       state.follow();
     },
-    dispose() {
-      state.removeEventListener('ct', tell);
-      state.removeEventListener('view', viewed);
-      state.removeEventListener('slice', shown.values.update);
-      shown.dispose();
-    }
+    dispose: shown.dispose
   };
 }
 

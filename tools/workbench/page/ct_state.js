@@ -2,27 +2,17 @@
 // The CT of the open case, and what its panels share: the crosshair, the window, the tool of a click, and the drawings
 // over the slices. Events: 'ct' (another CT, or a fault), 'slice' (the values of a slice have arrived), 'lost' (what
 // stands for the CT is no longer in the server's memory), 'view' (anything else).
+import {StateOfDraft} from './draft.js';
 import * as Ask from './server.js';
-import * as Shell from './shell.js';
 import * as SliceGeometry from './slice_geometry.js';
 
-export class CtState extends EventTarget {
-  // All panels of a draft share one state.
-  static of(draft) {
-    if (!CtState.known.has(draft)) CtState.known.set(draft, new CtState(draft));
-    return CtState.known.get(draft);
-  }
-
+export class CtState extends StateOfDraft {
   constructor(draft) {
-    super();
+    super(draft);
     Object.assign(this, {
-      draft,
       ct: null,         // as about_ct() of the server describes it, or null
       stands_in: null,  // the same for a case without a CT: air on the grid of its labels
-      fault: '',
-      command: '',
-      isReading: false,
-      read: 'null',  // the document's `ct` that was read
+      read: 'null',     // the document's `ct` that was read
       cursor_mm: [0, 0, 0],
       window: {level: 400, width: 1800},
       // {key, hint, says(value_hu), place(point_mm)} or null: a click moves the crosshair. says(): for the pointer
@@ -35,10 +25,6 @@ export class CtState extends EventTarget {
     });
   }
 
-  tell(name) {
-    this.dispatchEvent(new Event(name));
-  }
-
   // Reads the CT that the document names, unless it is read already.
   async follow(isAgain) {
     const wanted = JSON.stringify(this.draft.document.ct);
@@ -47,14 +33,7 @@ export class CtState extends EventTarget {
     Object.assign(this, {isReading: wanted !== 'null', fault: ''});
     if (wanted === 'null') return this.show(this.stands_in);
     this.tell('ct');
-    let ct = null, fault = '';
-    try {
-      const {job, command} = await Ask.post('api/ct/open', {ct: JSON.parse(wanted)});
-      this.command = command;
-      ct = await Shell.follow('Reading the CT', job);
-    } catch (error) {
-      fault = error.message;
-    }
+    const {value: ct, fault} = await this.opened('Reading the CT', 'api/ct/open', {ct: JSON.parse(wanted)});
     if (this.read !== wanted) return;  // another CT was chosen in the meantime
     Object.assign(this, {fault, isReading: false});
     this.show(ct, isAgain);
@@ -119,4 +98,3 @@ export class CtState extends EventTarget {
     return [...this.marks.values()].flatMap((list) => list());
   }
 }
-CtState.known = new WeakMap();

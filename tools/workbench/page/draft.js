@@ -4,6 +4,8 @@ import * as Ask from './server.js';
 import * as Shell from './shell.js';
 
 export class CaseDraft extends EventTarget {
+  states = new Map();  // of its files, by their class
+
   static async open(path) {
     const draft = new CaseDraft();
     draft.take(await Ask.json('api/draft', {case: path}));
@@ -50,5 +52,33 @@ export class CaseDraft extends EventTarget {
     });
     this.last = turn.catch(() => {});
     return turn;
+  }
+}
+
+// What the panels of a draft share about one of its files, and that is read by a job of the server.
+export class StateOfDraft extends EventTarget {
+  static of(draft) {
+    if (!draft.states.has(this)) draft.states.set(this, new this(draft));
+    return draft.states.get(this);
+  }
+
+  constructor(draft) {
+    super();
+    Object.assign(this, {draft, fault: '', command: '', isReading: false});
+  }
+
+  tell(name) {
+    this.dispatchEvent(new Event(name));
+  }
+
+  // Resolves to {value, fault}: one of them is null or ''.
+  async opened(title, path, body) {
+    try {
+      const {job, command} = await Ask.post(path, body);
+      this.command = command;
+      return {value: await Shell.follow(title, job), fault: ''};
+    } catch (error) {
+      return {value: null, fault: error.message};
+    }
   }
 }

@@ -67,7 +67,7 @@ const giveBy = (draft, name, given) => draft.change('give ' + name + ' by ' + Ob
 });
 
 async function chooseSurface(draft, name, given) {
-  const at = given ? given.file.split('/').slice(0, -1).join('/') : '';
+  const at = Shell.folderOf(given ? given.file : '');
   const file = await Shell.choose(
       'Choose the closed surface of ' + name + ': STL, PLY, OBJ or VTP', {accepts: (one) => SURFACE.test(one), at});
   if (file !== undefined) await giveBy(draft, name, {surface: {...given, file}});
@@ -175,7 +175,7 @@ function faultOf(draft) {
       'Some fragments are given by ' + ways[0] + ', some by ' + ways[1] + '. A case gives all of them in the same way.';
 }
 
-function make(draft) {
+function make(draft, left) {
   const state = CtState.of(draft), labels = LabelsState.of(draft), list = el('ul', {class: 'fragments'});
   const fault = el('p', {class: 'fault', role: 'status'});
   const values = new CtValues(state, () => update());
@@ -197,11 +197,10 @@ function make(draft) {
     renew();
   };
   state.marks.set('seeds', () => marks(draft));
-  state.addEventListener('ct', update);
-  state.addEventListener('view', update);
-  labels.addEventListener('labels', update);
   const ends = (event) => event.key === 'Escape' && state.tool && state.setTool(null);
-  document.addEventListener('keydown', ends);
+  for (const name of ['ct', 'view']) state.addEventListener(name, update, {signal: left});
+  labels.addEventListener('labels', update, {signal: left});
+  document.addEventListener('keydown', ends, {signal: left});
   return {
     element: el(
         'div', {class: 'fragments-panel'},
@@ -209,13 +208,7 @@ function make(draft) {
            'A bone fragment grows from its seeds: points inside its bone. Or a label or a surface of another program ' +
                'gives it. A fragment that is not registered is only separated from the others.'),
         add, fault, list),
-    update,
-    dispose() {
-      state.removeEventListener('ct', update);
-      state.removeEventListener('view', update);
-      labels.removeEventListener('labels', update);
-      document.removeEventListener('keydown', ends);
-    }
+    update
   };
 }
 

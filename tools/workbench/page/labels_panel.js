@@ -13,7 +13,7 @@ import * as SliceGeometry from './slice_geometry.js';
 const LABELS = /\.(mha|nrrd|nii|nii\.gz|dcm)$/i;
 
 async function choose(draft) {
-  const at = (draft.document.labels || '').split('/').slice(0, -1).join('/');
+  const at = Shell.folderOf(draft.document.labels || '');
   const file = await Shell.choose(
       'Choose a label map: NIfTI, NRRD, .seg.nrrd, MHA, or a file or folder of DICOM SEG',
       {folders: true, accepts: (name) => LABELS.test(name) || !name.includes('.'), at});
@@ -33,8 +33,7 @@ function chosen(draft, labels) {
 // Makes a fragment of a segment, under its name.
 function add(draft, segment) {
   const taken = Object.keys(draft.document.fragments || {}), title = segment.name || LabelsState.title(segment);
-  let name = title;
-  for (let i = 2; taken.includes(name); ++i) name = title + ' ' + i;
+  const name = Shell.freeName(title, taken, ' ');
   draft.change('add the fragment ' + name, (document) => {
     document.fragments = {...(document.fragments || {}), [name]: {label: segment.label, register: true}};
   });
@@ -129,7 +128,7 @@ function readout(draft, state, labels) {
   };
 }
 
-function make(draft) {
+function make(draft, left) {
   const state = CtState.of(draft), labels = LabelsState.of(draft);
   let is_shown = true, wanted = '';
   const name = el('strong', {'data-labels': ''}), facts = el('span', {class: 'note'}), says = el('div', {});
@@ -173,14 +172,11 @@ function make(draft) {
     update();
     state.standIn(labels.labels && labels.labels.ct);
   };
-  const viewed = () => labels.labels && here.update();
-  const arrived = () => state.tell('view'), lost = () => labels.follow(true);
   state.overlay = overlay(draft, labels, () => is_shown);
-  labels.addEventListener('labels', read);
-  labels.addEventListener('slice', arrived);
-  state.addEventListener('view', viewed);
-  state.addEventListener('ct', viewed);
-  state.addEventListener('lost', lost);
+  labels.addEventListener('labels', read, {signal: left});
+  labels.addEventListener('slice', () => state.tell('view'), {signal: left});
+  for (const name of ['ct', 'view']) state.addEventListener(name, () => labels.labels && here.update(), {signal: left});
+  state.addEventListener('lost', () => labels.follow(true), {signal: left});
   update();
   return {
     element:
@@ -195,13 +191,6 @@ function make(draft) {
     update() {
       update();
       labels.follow();
-    },
-    dispose() {
-      labels.removeEventListener('labels', read);
-      labels.removeEventListener('slice', arrived);
-      state.removeEventListener('view', viewed);
-      state.removeEventListener('ct', viewed);
-      state.removeEventListener('lost', lost);
     }
   };
 }

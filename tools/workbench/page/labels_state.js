@@ -1,32 +1,23 @@
 // SPDX-License-Identifier: Apache-2.0
 // The label map of the open case, and its slices. Events: 'labels' (another map, or a fault), 'slice' (a slice has
 // arrived).
+import {StateOfDraft} from './draft.js';
 import * as Ask from './server.js';
 import * as Shell from './shell.js';
 
 const MOST_SLICES = 64;
 
-export class LabelsState extends EventTarget {
-  // All panels of a draft share one state.
-  static of(draft) {
-    if (!LabelsState.known.has(draft)) LabelsState.known.set(draft, new LabelsState(draft));
-    return LabelsState.known.get(draft);
-  }
-
+export class LabelsState extends StateOfDraft {
   constructor(draft) {
-    super();
+    super(draft);
     // `labels`: as about_labels() of the server describes it, or null; `read`: the file and whether there was a CT
-    Object.assign(this, {draft, labels: null, fault: '', command: '', isReading: false, read: ''});
+    Object.assign(this, {labels: null, read: ''});
     this.forget();
   }
 
   forget() {
     this.slices = new Map();
     this.asked = new Set();
-  }
-
-  tell(name) {
-    this.dispatchEvent(new Event(name));
   }
 
   // Reads the label map that the document names, unless it is read already. If the case has no CT, the labels have a
@@ -38,14 +29,8 @@ export class LabelsState extends EventTarget {
     this.forget();
     this.tell('labels');
     if (!file) return;
-    let labels = null, fault = '';
-    try {
-      const {job, command} = await Ask.post('api/labels/open', {labels: file, has_ct: Boolean(ct)});
-      this.command = command;
-      labels = await Shell.follow('Reading the labels', job);
-    } catch (error) {
-      fault = error.message;
-    }
+    const asked = {labels: file, has_ct: Boolean(ct)};
+    const {value: labels, fault} = await this.opened('Reading the labels', 'api/labels/open', asked);
     if (this.read !== wanted) return;  // another one was chosen in the meantime
     Object.assign(this, {labels, fault, isReading: false});
     this.forget();
@@ -91,4 +76,3 @@ export class LabelsState extends EventTarget {
         (one) => one.label !== null && (is_number ? one.number === Number(label) : one.name === label));
   }
 }
-LabelsState.known = new WeakMap();

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The outputs of a node: pictures, slices, surfaces, figures and texts.
-import {el, number, withUnit} from '../../report/page/dom.js';
+import {el, number, row, table, withUnit} from '../../report/page/dom.js';
 import {decoded} from '../../report/page/meshes.js';
 import * as Verdict from '../../report/page/verdict.js';
 
@@ -41,14 +41,9 @@ function surface(part) {
       'div', {}, view.element, el('p', {class: 'note'}, part.text + '. Drag or arrow keys turn it, + and − zoom.'));
 }
 
-const figures = (part) =>
-    el('div', {class: 'scroll'},
-       el('table', {class: 'values'},
-          el('tbody', {},
-             part.figures.map(
-                 (one) =>
-                     el('tr', {}, el('th', {scope: 'row'}, one.name),
-                        el('td', {class: 'number'}, withUnit(one.value, one.unit)))))));
+const figures = (part) => table(
+    {class: 'values'}, null, null,
+    part.figures.map((one) => row(one.name, [withUnit(one.value, one.unit)], {class: 'number'})));
 
 function shown(part, what) {
   const name = part.name && el('p', {class: 'note'}, part.name);

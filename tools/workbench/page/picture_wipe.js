@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Two pictures one over the other, with a line between them that is moved by a slider, or by dragging over the picture.
-import {el} from '../../report/page/dom.js';
+import {dragAcross, el} from '../../report/page/dom.js';
 
 // first, second: {src, text}. Left of the line is the first.
 export function wipe(first, second, what) {
@@ -22,16 +22,7 @@ export function wipe(first, second, what) {
     slider.value = percent;
     stage.style.setProperty('--at', percent + '%');
   }
-  const follow = (event) => {
-    if (!event.buttons) return;
-    const box = stage.getBoundingClientRect();
-    set(Math.max(0, Math.min(100, 100 * (event.clientX - box.left) / box.width)));
-  };
-  stage.addEventListener('pointerdown', (event) => {
-    stage.setPointerCapture(event.pointerId);
-    follow(event);
-  });
-  stage.addEventListener('pointermove', follow);
+  dragAcross(stage, set);
   set(50);
   return el('figure', {class: 'wiped'}, stage, slider);
 }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Points of a CT as a list that works with keys alone, and fields for their names.
-import {button, el, labelled} from '../../report/page/dom.js';
+import {button, el, form, labelled} from '../../report/page/dom.js';
 
 import * as Shell from './shell.js';
 
@@ -26,21 +26,16 @@ export const row = (state, what, point_mm, {moveTo, remove}, more) =>
 export function nameField(label, text, taken, chosen) {
   const told = el('p', {class: 'fault', role: 'alert'});
   const box = el('input', {type: 'text', maxlength: 100, oninput: () => (told.textContent = '')});
-  const form =
-      el('form', {
-        class: 'toolbar',
-        onsubmit: (event) => {
-          event.preventDefault();
-          const name = box.value.trim(), fault = faultOf(name, taken());
-          told.textContent = fault;
-          if (fault) return;
-          box.value = '';
-          chosen(name);
-        }
-      },
-         labelled(label, box), el('button', {type: 'submit'}, text), told);
-  form.box = box;
-  return form;
+  const take = () => {
+    const name = box.value.trim();
+    told.textContent = faultOf(name, taken());
+    if (told.textContent) return;
+    box.value = '';
+    chosen(name);
+  };
+  const field = form({class: 'toolbar'}, take, labelled(label, box), el('button', {type: 'submit'}, text), told);
+  field.box = box;
+  return field;
 }
 
 function faultOf(name, taken) {

@@ -38,7 +38,7 @@ function verdictCell(row) {
 }
 
 // The first few lines; the others are folded away.
-function folded(lines, most) {
+export function folded(lines, most) {
   const rest = lines.slice(most);
   return [
     ...lines.slice(0, most), rest.length ? el('details', {}, el('summary', {}, rest.length + ' more'), rest) : ''
@@ -53,13 +53,10 @@ function figuresCell(row) {
   const words = (one) => [FigureWords.term(one.name), ' ', el('strong', {}, FigureWords.withUnit(one.value, one.unit))];
   const first = figures.filter((one) => one.column === figures[0].column).slice(0, MOST_FIGURES);
   const rest = figures.filter((one) => !first.includes(one));
-  return [
-    el('div', {}, figures[0].column ? figures[0].column + ': ' : '',
-       first.map((one, i) => [el('span', {class: 'merit'}, words(one), i + 1 < first.length ? ',' : ''), ' '])),
-    rest.length ? el('details', {}, el('summary', {}, rest.length + ' more'),
-                     rest.map((one) => el('div', {}, one.column ? one.column + ': ' : '', words(one)))) :
-                  ''
-  ];
+  const head =
+      el('div', {}, figures[0].column ? figures[0].column + ': ' : '',
+         first.map((one, i) => [el('span', {class: 'merit'}, words(one), i + 1 < first.length ? ',' : ''), ' ']));
+  return folded([head, ...rest.map((one) => el('div', {}, one.column ? one.column + ': ' : '', words(one)))], 1);
 }
 
 function changesCell(row) {

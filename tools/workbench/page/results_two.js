@@ -7,6 +7,7 @@ import * as Verdict from '../../report/page/verdict.js';
 
 import * as FigureWords from './figure_words.js';
 import {wipe} from './picture_wipe.js';
+import {folded} from './results_list.js';
 import * as Ask from './server.js';
 import * as Shell from './shell.js';
 
@@ -26,12 +27,6 @@ const table = (caption, head, rows, numbers = 0) => rows.length ?
                 head.map((text, i) => el('th', {scope: 'col', class: i >= head.length - numbers && 'number'}, text)))),
           el('tbody', {}, rows))) :
     '';
-
-// The first lines; the others are folded away.
-function folded(lines) {
-  const some = lines.map((line) => el('div', {}, line)), rest = some.splice(MOST_LINES);
-  return rest.length ? [...some, el('details', {}, el('summary', {}, rest.length + ' more'), rest)] : some;
-}
 
 function verdictCard(title, folder, verdicts) {
   const one = (verdict) =>
@@ -172,7 +167,8 @@ function outputsSection(outputs) {
           'Outputs that differ', ['Output', 'Difference'],
           rows.map(
               ([name, lines]) =>
-                  el('tr', {'data-output': name}, el('th', {scope: 'row'}, name), el('td', {}, folded(lines))))),
+                  el('tr', {'data-output': name}, el('th', {scope: 'row'}, name),
+                     el('td', {}, folded(lines.map((line) => el('div', {}, line)), MOST_LINES))))),
       same.length ? el('p', {class: 'note'}, 'The same: ' + same.join(', ')) : '');
 }
 

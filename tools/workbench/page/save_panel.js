@@ -18,14 +18,13 @@ const pipelinesFor = ({document}) =>
 async function mayLose(draft) {
   const {lost} = await Ask.json('api/case/lost-comments', {case: draft.path}).catch(() => ({lost: []}));
   if (!lost.length) return true;
-  return Boolean(await Shell.dialog(
-      'Comments will be lost',
-      (close) => el(
-          'div', {},
-          el('p', {}, 'The parts that they belong to have changed, so these comments of the older files will be lost:'),
-          el('ul', {class: 'faults', 'data-lost': ''}, lost.map((comment) => el('li', {}, comment))),
-          el('div', {class: 'toolbar'}, Dom.button('Save without them', () => close(true), {'data-do': 'save-without'}),
-             Dom.button('Do not save', () => close(false), {'data-do': 'do-not-save'})))));
+  const content = [
+    el('p', {}, 'The parts that they belong to have changed, so these comments of the older files will be lost:'),
+    el('ul', {class: 'faults', 'data-lost': ''}, lost.map((comment) => el('li', {}, comment)))
+  ];
+  return Shell.sure(
+      'Comments will be lost', content, ['Save without them', {'data-do': 'save-without'}],
+      ['Do not save', {'data-do': 'do-not-save'}]);
 }
 
 function make(draft) {

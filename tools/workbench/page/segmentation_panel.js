@@ -64,7 +64,7 @@ async function surfaces(segmentation, names, colourOf) {
 }
 
 class Panel {
-  constructor(draft) {
+  constructor(draft, left) {
     Object.assign(
         this, {draft, state: CtState.of(draft), chosen: null, segmented: '', shownFor: '', isRunning: false, turn: 0});
     this.solid = new SurfaceView('Surfaces of the fragments; arrow keys turn them');
@@ -86,16 +86,11 @@ class Panel {
     this.command = el('details', {hidden: true}, el('summary', {}, 'The same in a shell, once the case is saved'));
     this.element = el(
         'div', {}, el('div', {class: 'toolbar'}, this.how, field, this.button), this.outcome, this.old, this.command);
-    this.renewed = () => {
+    const renewed = () => {
       if (!this.state.ct || this.state.ct.name !== this.segmented) this.state.contours.delete('segmentation');
       this.update();
     };
-    this.state.addEventListener('ct', this.renewed);
-  }
-
-  dispose() {
-    this.state.removeEventListener('ct', this.renewed);
-    this.solid.dispose();
+    this.state.addEventListener('ct', renewed, {signal: left});
   }
 
   fragments() {
@@ -191,12 +186,12 @@ class Panel {
   }
 }
 
-CasePage.panel('Segmentation', 'bones', 30, (draft) => {
-  const panel = new Panel(draft);
+CasePage.panel('Segmentation', 'bones', 30, (draft, left) => {
+  const panel = new Panel(draft, left);
   return {
     element: panel.element,
     stage: {surfaces: panel.picture},
     update: () => panel.update(),
-    dispose: () => panel.dispose()
+    dispose: () => panel.solid.dispose()
   };
 });

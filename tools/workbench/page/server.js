@@ -56,4 +56,30 @@ export const json = async (path, parameters, signal) => (await get(path, paramet
 export const bytes = async (path, parameters, signal) => bytesOf(await get(path, parameters, signal));
 export const post = async (path, body, signal) => (await posted(path, body, signal)).json();
 export const postForBytes = async (path, body, signal) => bytesOf(await posted(path, body, signal));
+
+// Returns a function that posts the newest body to `path` when no other has come for some time, if there is enough to
+// ask about. answered(answer, fault) gets (null, '') where there is not.
+export function whenStill(path, pause_ms, answered) {
+  let known = '', timer = null, aborter = new AbortController();
+  async function ask(body) {
+    aborter = new AbortController();
+    try {
+      answered(await post(path, body, aborter.signal), '');
+    } catch (error) {
+      if (error.name !== 'AbortError') answered(null, error.message);
+    }
+  }
+  return (body, is_enough) => {
+    const text = JSON.stringify(body);
+    if (text === known) return;
+    known = text;
+    clearTimeout(timer);
+    aborter.abort();
+    if (is_enough)
+      timer = setTimeout(() => ask(body), pause_ms);
+    else
+      answered(null, '');
+  };
+}
+
 export const stop = (job) => posted('api/job/stop', {job});

@@ -76,6 +76,15 @@ async function show() {
 // The name of a path in the opened folder.
 export const nameOf = (path) => (path && path !== '.' ? path : '(this folder)');
 
+export const folderOf = (path) => path.split('/').slice(0, -1).join('/');
+
+// `name`, or if it is taken the first free one of name-2, name-3, ...; `between` may be another sign than the hyphen.
+export function freeName(name, taken, between = '-') {
+  let free = name;
+  for (let number = 2; taken.includes(free); ++number) free = name + between + number;
+  return free;
+}
+
 // Links to a page for these paths, or a note if there are none.
 export const links = (name, paths, none) =>
     (paths.length ? el('ul', {class: 'files'},
@@ -163,6 +172,15 @@ export function dialog(title, fill) {
   });
 }
 
+// Asks a question, `content`. yes and no: [text, more attributes] of the buttons. Resolves to whether it is answered
+// by yes.
+export const sure = async (title, content, yes, no) => Boolean(await dialog(
+    title,
+    (close) =>
+        el('div', {}, content,
+           el('div', {class: 'toolbar'}, Dom.button(yes[0], () => close(true), yes[1]),
+              Dom.button(no[0], () => close(false), no[1])))));
+
 // Lets the user choose a file or a folder of the opened folder. accepts(name) says which files may be chosen; with
 // `folders`, the folder that is shown may be chosen, too. Resolves to its relative path, or undefined.
 export const choose = (title, {accepts = () => true, folders = false, at = ''} = {}) => dialog(title, (close) => {
@@ -173,8 +191,7 @@ export const choose = (title, {accepts = () => true, folders = false, at = ''} =
     place.replaceChildren(
         el('p', {class: 'note'}, here || '(the folder that is open)',
            folders && Dom.button('Choose this folder', () => close(here), {'data-choose': here || '.'})),
-        el('ul', {class: 'files'},
-           here !== '' && el('li', {}, Dom.button('.. up', () => open(here.split('/').slice(0, -1).join('/')))),
+        el('ul', {class: 'files'}, here !== '' && el('li', {}, Dom.button('.. up', () => open(folderOf(here)))),
            names.map(
                (name) => el('li', {}, Dom.button(name + '/', () => open(below(name)), {'data-open': below(name)}))),
            files.filter((file) => accepts(file.name))

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The dialogs that add a view to a case, or give another camera to one.
-import {button, el, labelled} from '../../report/page/dom.js';
+import {button, el, form, labelled} from '../../report/page/dom.js';
 
 import * as Ask from './server.js';
 import * as Shell from './shell.js';
@@ -8,15 +8,8 @@ import {armFields} from './xray_arm.js';
 import * as XrayCameraFile from './xray_camera_file.js';
 
 const is_image = (name) => /\.(png|tiff?|dcm|dicom)$/i.test(name);
-const folderOf = (path) => path.split('/').slice(0, -1).join('/');
 // "frontal.0001" of "a/frontal.0001.png".
 const stem = (path) => path.split('/').pop().replace(/\.[^.]*$/, '');
-
-function freeName(name, taken) {
-  if (!taken.includes(name)) return name;
-  for (let number = 2;; ++number)
-    if (!taken.includes(`${name} ${number}`)) return `${name} ${number}`;
-}
 
 // Resolves to {name, kind: 'file' | 'header' | 'c_arm', c_arm}, or to undefined.
 function ask(title, image, name, taken, camera, before) {
@@ -36,14 +29,9 @@ function ask(title, image, name, taken, camera, before) {
                 'The isocentre is between source and detector, so its distance must be the smaller one.');
       close({name: chosen, kind, c_arm});
     };
-    const form =
-        el('form', {
-          onsubmit: (event) => {
-            event.preventDefault();
-            finish('c_arm');
-          }
-        },
-           arm.element, el('button', {type: 'submit', 'data-camera': 'c_arm'}, 'Use these angles and distances'));
+    const fields = form(
+        {}, () => finish('c_arm'), arm.element,
+        el('button', {type: 'submit', 'data-camera': 'c_arm'}, 'Use these angles and distances'));
     if (!has_header) setTimeout(() => arm.first().focus());
     return el(
         'div', {class: 'add-view'}, el('p', {class: 'note'}, image), labelled('Name of the view', box), fault,
@@ -54,7 +42,7 @@ function ask(title, image, name, taken, camera, before) {
             el('p', {}, button('Read the DICOM header', () => finish('header'), {'data-camera': 'header'}), ' ',
                el('span', {class: 'note'}, 'exact to about a degree at best')),
         el('details', {open: !has_header || Boolean(camera && camera.c_arm)},
-           el('summary', {}, 'Angles and distances of a C-arm'), form));
+           el('summary', {}, 'Angles and distances of a C-arm'), fields));
   });
 }
 
@@ -62,7 +50,7 @@ function ask(title, image, name, taken, camera, before) {
 async function cameraFor(answer, image) {
   if (answer.kind === 'file') {
     const file =
-        await Shell.choose(`Camera of ${answer.name}`, {at: folderOf(image), accepts: (name) => !is_image(name)});
+        await Shell.choose(`Camera of ${answer.name}`, {at: Shell.folderOf(image), accepts: (name) => !is_image(name)});
     return file && XrayCameraFile.cameraOf(file);
   }
   if (answer.kind === 'header') {
@@ -76,9 +64,9 @@ async function cameraFor(answer, image) {
 
 export async function add(draft) {
   const last = (draft.document.views || []).at(-1);
-  const image = await Shell.choose('X-ray image', {accepts: is_image, at: last ? folderOf(last.image) : ''});
+  const image = await Shell.choose('X-ray image', {accepts: is_image, at: last ? Shell.folderOf(last.image) : ''});
   if (!image) return;
-  const taken = (draft.document.views || []).map((view) => view.name), name = freeName(stem(image), taken);
+  const taken = (draft.document.views || []).map((view) => view.name), name = Shell.freeName(stem(image), taken, ' ');
   const before = (draft.document.views || []).findLast(({camera}) => camera && camera.c_arm);
   const answer =
       await ask('Add an X-ray', image, name, taken, null, before && {name: before.name, c_arm: before.camera.c_arm});

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The dialog that asks what a camera file of another program leaves open (docs/formats.md).
-import {el, labelled, select} from '../../report/page/dom.js';
+import {el, form, labelled, select} from '../../report/page/dom.js';
 
 import * as Shell from './shell.js';
 
@@ -22,15 +22,14 @@ const ask = (file) => Shell.dialog('Camera file with projections', (close) => {
       'How the program’s image was turned over to become this one', MIRRORS, is_rtk(file) ? 'upside_down' : 'none',
       () => {});
   mirror.box.dataset.cameraFile = 'mirror';
-  const submit = (event) => {
-    event.preventDefault();
+  const submit = () => {
     const camera = {file, projection: Number(projection.value)};
     if (mirror.box.value !== 'none') camera.mirror = mirror.box.value;
     if (is_rtk(file)) camera.pixel_mm = [Number(pixel.value), Number(pixel.value)];
     close(camera);
   };
-  return el(
-      'form', {class: 'arm-fields', onsubmit: submit}, el('p', {class: 'note'}, file),
+  return form(
+      {class: 'arm-fields'}, submit, el('p', {class: 'note'}, file),
       labelled('Number of the projection, counted from 0', projection), mirror,
       is_rtk(file) && labelled('Size of a pixel on the detector, mm', pixel),
       el('div', {class: 'toolbar'}, el('button', {type: 'submit', 'data-camera-file': 'ok'}, 'Use this camera')));

@@ -52,30 +52,17 @@ function figuresOf(views) {
   return rows;
 }
 
-// Asks marrow to check the cameras when views and landmarks no longer change. Calls told({warnings, command}) or
-// told({fault}).
+// Asks marrow to check the cameras when views and landmarks no longer change. Calls told({warnings, command}),
+// told({warnings, fault}), or told(null) if there is no view.
 function checking(draft, told) {
-  let asked = '', timer = null, aborter = null;
+  const ask =
+      Ask.whenStill('api/xray/check', CHECK_PAUSE_ms, (answer, fault) => told(fault ? {fault, warnings: []} : answer));
   return (views) => {
     const landmarks = (draft.document.landmarks || []).map(({name, pixels}) => {
       const known = Object.entries(pixels || {}).filter(([view]) => views.some((one) => one.view.name === view));
       return {name, pixels: Object.fromEntries(known)};
     });
-    const body = {views: views.map(({view: {name, image, camera}}) => ({name, image, camera})), landmarks};
-    const text = JSON.stringify(body);
-    if (text === asked) return;
-    asked = text;
-    clearTimeout(timer);
-    if (aborter) aborter.abort();
-    if (!views.length) return told(null);
-    timer = setTimeout(async () => {
-      aborter = new AbortController();
-      try {
-        told(await Ask.post('api/xray/check', body, aborter.signal));
-      } catch (error) {
-        if (error.name !== 'AbortError') told({fault: error.message, warnings: []});
-      }
-    }, CHECK_PAUSE_ms);
+    ask({views: views.map(({view: {name, image, camera}}) => ({name, image, camera})), landmarks}, views.length > 0);
   };
 }
 
@@ -110,10 +97,7 @@ export function make(draft) {
     const known = views.map((view, i) => ({view, camera: entries[i].camera})).filter((one) => one.camera);
     const now = JSON.stringify(known);
     if (now !== shown)
-      figures.replaceChildren(
-          el('tbody', {},
-             figuresOf(known).map(
-                 ([what, figure]) => el('tr', {}, el('th', {scope: 'row'}, what), el('td', {}, figure)))));
+      figures.replaceChildren(el('tbody', {}, figuresOf(known).map(([what, figure]) => Dom.row(what, [figure]))));
     shown = now;
     size.textContent = XrayPixelSize.advice(known, draft.document.landmarks || []);
     if (entries.every((one) => one.is_ready)) ask(known);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Exports seeds, landmarks, starts and cameras to files of marrow and of other programs (docs/formats.md).
-import {button, el, labelled, select} from '../../report/page/dom.js';
+import {el, form, labelled, select} from '../../report/page/dom.js';
 
 import * as Ask from './server.js';
 import * as Shell from './shell.js';
@@ -91,23 +91,18 @@ const ask = (shared, what, names, beside) => Shell.dialog(`Export: ${TITLES[what
     one.hidden = names.length < 2 || (is_camera ? format.box.value !== '.txt' : format.box.value === '.yaml');
   };
   update();
-  const submit = (event) => {
-    event.preventDefault();
-    close({path: box.value.trim(), one: one.hidden ? null : one.box.value, pixel_mm: Number(pixel.value)});
-  };
+  const submit = () =>
+      close({path: box.value.trim(), one: one.hidden ? null : one.box.value, pixel_mm: Number(pixel.value)});
   setTimeout(() => box.focus());
-  return el(
-      'form', {class: 'arm-fields', onsubmit: submit}, format, labelled('File in the folder that is open', box), one,
+  return form(
+      {class: 'arm-fields'}, submit, format, labelled('File in the folder that is open', box), one,
       is_camera && labelled('Width of a pixel on the detector, mm', pixel),
       el('div', {class: 'toolbar'}, el('button', {type: 'submit', 'data-do': 'ok'}, 'Export')));
 });
 
-const confirmed = (path) => Shell.dialog(
-    'Replace the file?',
-    (close) =>
-        el('div', {}, el('p', {}, `${path} is there already.`),
-           el('div', {class: 'toolbar'}, button('Replace it', () => close(true), {'data-do': 'replace'}),
-              button('Keep it', () => close(false), {'data-do': 'keep'}))));
+const confirmed = (path) => Shell.sure(
+    'Replace the file?', el('p', {}, `${path} is there already.`), ['Replace it', {'data-do': 'replace'}],
+    ['Keep it', {'data-do': 'keep'}]);
 
 // Resolves to the server's answer, or to undefined if an older file is kept.
 async function written(body) {

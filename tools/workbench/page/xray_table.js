@@ -11,16 +11,15 @@ export function askName(title, value, taken) {
   return Shell.dialog(title, (close) => {
     const box = el('input', {type: 'text', value, 'data-name': 'new', required: true, maxlength: 100});
     const fault = el('p', {class: 'fault', role: 'alert'});
-    const submit = (event) => {
-      event.preventDefault();
+    const submit = () => {
       const name = box.value.trim();
       if (!name) return void (fault.textContent = 'Give a name.');
       if (name !== value && taken.includes(name)) return void (fault.textContent = `The name “${name}” is taken.`);
       close(name);
     };
     setTimeout(() => box.select());
-    return el(
-        'form', {onsubmit: submit}, Dom.labelled('Name', box), fault,
+    return Dom.form(
+        {}, submit, Dom.labelled('Name', box), fault,
         el('div', {class: 'toolbar'}, el('button', {type: 'submit', 'data-do': 'ok'}, 'OK')));
   });
 }

@@ -85,9 +85,6 @@ function sidesText(views) {
       '';
 }
 
-const degrees = (value) => value.toFixed(1) + '°';
-const millimetres = (value) => Dom.number(value) + ' mm';
-
 // The rows of the list. A row is made again only if what it shows has changed.
 function rows(draft, list) {
   const made = new Map();  // by the view's name: {signature, element}

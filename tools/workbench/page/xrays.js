@@ -148,20 +148,10 @@ function row(shared, tool) {
 
 // Requests the pose from the landmarks when they no longer change.
 function fitting(shared, told) {
-  let asked = '', timer = null, aborter = null;
-  const ask = async (body) => {
-    if (aborter) aborter.abort();
-    aborter = new AbortController();
-    try {
-      shared.fit = await Ask.post('api/xray/fit', body, aborter.signal);
-      shared.fit_fault = '';
-    } catch (error) {
-      if (error.name === 'AbortError') return;
-      shared.fit = null;
-      shared.fit_fault = error.message;
-    }
+  const ask = Ask.whenStill('api/xray/fit', FIT_PAUSE_ms, (fit, fit_fault) => {
+    Object.assign(shared, {fit, fit_fault});
     told();
-  };
+  });
   return () => {
     const fragment = shared.fragment();
     const landmarks = (shared.draft.document.landmarks ||
@@ -170,16 +160,8 @@ function fitting(shared, told) {
         shared.views()
             .filter((view) => shared.cameraOf(view.name))
             .map(({name, image, camera}) => ({name, image, camera, width_px: shared.cameraOf(name).width_px}));
-    const body = {fragment, landmarks, views}, text = JSON.stringify(body);
-    if (text === asked) return;
-    asked = text;
-    clearTimeout(timer);
-    if (landmarks.length >= 3 && views.length && landmarks.some((one) => Object.keys(one.pixels || {}).length))
-      timer = setTimeout(() => ask(body), FIT_PAUSE_ms);
-    else {
-      shared.fit = null;
-      shared.fit_fault = '';
-    }
+    const are_seen = landmarks.some((one) => Object.keys(one.pixels || {}).length);
+    ask({fragment, landmarks, views}, landmarks.length >= 3 && views.length > 0 && are_seen);
   };
 }
 
