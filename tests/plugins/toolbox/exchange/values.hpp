@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 // What the tests of other programs' formats share: nodes that read and write files, called as they are shipped.
-#include "tests/plugins/read/files.hpp"
-#include "tests/plugins/read/hostile.hpp"
+#include "tests/plugins/read/damage.hpp"
 #include "tests/plugins/read/reading.hpp"
 #include "tests/plugins/write/writing.hpp"
 
@@ -18,9 +17,7 @@ inline const std::filesystem::path kData =
 
 /// The text with other ends of its lines than \n.
 inline std::string with_line_ends(const std::string& text, const std::string& line_end) {
-  std::string result;
-  for (const char c : text) result += c == '\n' ? line_end : std::string(1, c);
-  return result;
+  return with_each(text, "\n", line_end);
 }
 
 /// Calls write.NODE with one input, writes what it gives by its writer, and returns the file's bytes.
