@@ -21,11 +21,7 @@ const std::string kDoubt =
 /// RTK's geometry with its lengths in mm, or in cm.
 std::string rtk(bool in_cm) {
   const std::string in_mm =
-      "<?xml version=\"1.0\"?>\n<!DOCTYPE RTKGEOMETRY>\n<RTKThreeDCircularGeometry version=\"3\">\n"
-      "<SourceToIsocenterDistance>1000</SourceToIsocenterDistance>\n"
-      "<SourceToDetectorDistance>1500</SourceToDetectorDistance>\n"
-      "<Projection><GantryAngle>30</GantryAngle><ProjectionOffsetX>20</ProjectionOffsetX></Projection>\n"
-      "</RTKThreeDCircularGeometry>\n";
+      rtk_geometry("<Projection><GantryAngle>30</GantryAngle><ProjectionOffsetX>20</ProjectionOffsetX></Projection>\n");
   return in_cm ? with(with(with(in_mm, "1000", "100"), "1500", "150"), ">20<", ">2<") : in_mm;
 }
 

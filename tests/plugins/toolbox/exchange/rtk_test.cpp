@@ -10,12 +10,9 @@ using Eigen::Vector3d, Eigen::Vector2d;
 using exchange::RtkFile;
 using Rtk = InAFolder;
 
-/// A file with one projection, 1000 mm from the source to the isocentre and 1500 mm to the detector.
+/// A file with one projection.
 std::string file(const std::string& elements, const std::string& matrix = "") {
-  return "<?xml version=\"1.0\"?>\n<!DOCTYPE RTKGEOMETRY>\n<RTKThreeDCircularGeometry version=\"3\">\n"
-         "  <SourceToIsocenterDistance>1000</SourceToIsocenterDistance>\n"
-         "  <SourceToDetectorDistance>1500</SourceToDetectorDistance>\n  <Projection>\n    " +
-         elements + "\n    " + matrix + "\n  </Projection>\n</RTKThreeDCircularGeometry>\n";
+  return rtk_geometry("  <Projection>\n    " + elements + "\n    " + matrix + "\n  </Projection>\n");
 }
 
 const shipped::Options kImage = {

@@ -20,6 +20,14 @@ inline std::string with_line_ends(const std::string& text, const std::string& li
   return with_each(text, "\n", line_end);
 }
 
+/// RTK's geometry: 1000 mm from the source to the isocentre, 1500 mm to the detector.
+inline std::string rtk_geometry(const std::string& projections) {
+  return "<?xml version=\"1.0\"?>\n<!DOCTYPE RTKGEOMETRY>\n<RTKThreeDCircularGeometry version=\"3\">\n"
+         "  <SourceToIsocenterDistance>1000</SourceToIsocenterDistance>\n"
+         "  <SourceToDetectorDistance>1500</SourceToDetectorDistance>\n" +
+         projections + "</RTKThreeDCircularGeometry>\n";
+}
+
 /// Calls write.NODE with one input, writes what it gives by its writer, and returns the file's bytes.
 template <class File, class T>
 std::string written_by(const std::string& node, const std::string& port, const T& value,

@@ -12,12 +12,9 @@ using Eigen::Vector3d;
 const std::filesystem::path kXreg = kData / "xreg-by-h5py.h5";  // three projections of 200 x 160 pixels
 
 /// The gantry at 0 and at 90 degrees.
-const char* kRtk =
-    "<?xml version=\"1.0\"?>\n<!DOCTYPE RTKGEOMETRY>\n<RTKThreeDCircularGeometry version=\"3\">\n"
-    "  <SourceToIsocenterDistance>1000</SourceToIsocenterDistance>\n"
-    "  <SourceToDetectorDistance>1500</SourceToDetectorDistance>\n"
+const std::string kRtk = rtk_geometry(
     "  <Projection><GantryAngle>0</GantryAngle></Projection>\n"
-    "  <Projection><GantryAngle>90</GantryAngle></Projection>\n</RTKThreeDCircularGeometry>\n";
+    "  <Projection><GantryAngle>90</GantryAngle></Projection>\n");
 
 /// An image whose first pixel only is 1.
 void put_image(const std::filesystem::path& path, int width_px, int height_px) {
