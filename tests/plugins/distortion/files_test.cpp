@@ -62,7 +62,7 @@ TEST_F(DistortionFile, IsReadBackAsItWasWritten) {
     EXPECT_EQ(hash_of(files::read_distortion_file(folder / "d.yaml")), hash_of(d));
   }
   const std::string text = bytes_of(folder / "d.yaml");
-  expect_handled(folder, {"d.yaml", text, text.size(), {}, true}, files::read_distortion_file);
+  expect_handled(folder, {"d.yaml", text, text.size(), {}, true}, files::read_distortion_file, {.as_text = true});
 }
 
 TEST_F(DistortionFile, SaysWhereItIsWrong) {

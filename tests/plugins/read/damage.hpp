@@ -129,11 +129,19 @@ struct Damaged {
   bool must_be_refused = true;
 };
 
+/// What is done to a sample.
+struct Damages {
+  int cuts = 40, changes = 60;
+  bool as_text = false;           ///< changes are also those that a person makes
+  std::size_t memory = 64 << 20;  ///< what a reader may reserve: samples unpack to 200 kB, libraries have some MB
+  int least_refused = 0;
+};
+
 /// One to four bytes of the header with other bits; of a text, also a part left out, inserted, or a letter that means
 /// something to YAML.
-inline Damaged changed_copy(const Sample& sample, int number, std::mt19937_64& random) {
+inline Damaged changed_copy(const Sample& sample, bool as_text, int number, std::mt19937_64& random) {
   Damaged copy{"changed", sample.bytes, false};
-  if (sample.is_text && number % 2) {
+  if (as_text && number % 2) {
     const std::size_t at = random() % sample.bytes.size();
     copy.how += " in way " + std::to_string(number % 6) + " at " + std::to_string(at);
     if (number % 6 == 1)
@@ -154,12 +162,12 @@ inline Damaged changed_copy(const Sample& sample, int number, std::mt19937_64& r
 }
 
 /// Cut off, changed, with each of its lies, and replaced by what is no such file.
-inline std::vector<Damaged> damaged_copies(const Sample& sample, int cuts, int changes) {
+inline std::vector<Damaged> damaged_copies(const Sample& sample, const Damages& damages) {
   std::mt19937_64 random(sample.bytes.size() * 31 + sample.name.size());
   const std::size_t size = sample.bytes.size();
   std::vector<std::size_t> ends;
   for (const double part : {0.01, 0.1, 0.5, 0.9, 0.99}) ends.push_back(std::size_t(double(size) * part));
-  for (int i = 0; i < cuts; ++i)  // half of them anywhere, half where the header is
+  for (int i = 0; i < damages.cuts; ++i)  // half of them anywhere, half where the header is
     ends.push_back(random() % (i % 2 ? std::max<std::size_t>(sample.header_bytes, 1) : size));
   std::vector<Damaged> copies{{"empty", ""},
                               {"text", "this is a text, not what the name says\n"},
@@ -171,20 +179,10 @@ inline std::vector<Damaged> damaged_copies(const Sample& sample, int cuts, int c
   for (const std::size_t end : ends)
     copies.push_back({"cut off at " + std::to_string(end) + " of " + std::to_string(size), sample.bytes.substr(0, end),
                       !sample.is_text});
-  for (int i = 0; i < changes; ++i) copies.push_back(changed_copy(sample, i, random));
+  for (int i = 0; i < damages.changes; ++i) copies.push_back(changed_copy(sample, damages.as_text, i, random));
   for (const auto& [from, to] : sample.lies) copies.push_back({"a lie: " + to, with(sample.bytes, from, to)});
   return copies;
 }
-
-/// What a reader may reserve for small files: the largest sample unpacks to 200 kB, and the libraries' own buffers are
-/// some MB.
-inline constexpr std::size_t kMemory = 64 << 20;
-
-struct Damages {
-  int cuts = 40, changes = 60;
-  std::size_t memory = kMemory;
-  int least_refused = 0;
-};
 
 /// Reads damaged copies in a folder that may hold other, good files.
 inline void expect_handled(const TemporaryFolder& folder, const Sample& sample,
@@ -195,7 +193,7 @@ inline void expect_handled(const TemporaryFolder& folder, const Sample& sample,
   EXPECT_EQ(message_of([&] { read(path); }), "") << sample.name << " as it was";
   std::string said;
   EXPECT_EQ(outcome_of([&] { read(path); }, path.filename(), damages.memory, said), Outcome::accepted) << said;
-  for (const Damaged& copy : damaged_copies(sample, damages.cuts, damages.changes)) {
+  for (const Damaged& copy : damaged_copies(sample, damages)) {
     put(path, copy.bytes);
     const Outcome outcome = outcome_of([&] { read(path); }, path.filename(), damages.memory, said);
     ++counts[outcome];

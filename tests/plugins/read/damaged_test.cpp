@@ -214,7 +214,8 @@ TEST_F(Damaged, Texts) {
   const auto shipped_file = [](const char* name) { return bytes_of(Path(MARROW_SOURCE_DIR) / "pipelines" / name); };
   const auto expect = [&](const std::string& name, const std::string& text,
                           const std::vector<std::pair<std::string, std::string>>& lies, auto read) {
-    expect_handled(folder, {name, text, text.size(), lies, true}, [&](const Path& path) { read(path); });
+    expect_handled(folder, {name, text, text.size(), lies, true}, [&](const Path& path) { read(path); },
+                   {.as_text = true});
   };
   const auto camera = [](const Path& path) { files::read_camera_file(path); };
   expect(
@@ -252,10 +253,11 @@ TEST_F(Damaged, YamlBombs) {
                                   std::string(200000, '-'), "? " + std::string(50000, '?')})
     bombs.push_back({"", text, "c.yaml"});
   expect_faults(
-      folder / "c.yaml", kCamera, bombs, [](const Path& path) { files::read_camera_file(path); }, kMemory);
+      folder / "c.yaml", kCamera, bombs, [](const Path& path) { files::read_camera_file(path); }, 64 << 20);
 }
 
 TEST_F(Damaged, Cases) {
+  std::filesystem::create_directory(folder / "case");
   write_itk(folder / "case/ct.mha", stack());
   write_itk(folder / "case/a.png", picture());
   put(folder / "case/a.yaml", with(with(with(kCamera, "640", "60"), "480", "40"), "[0.1, 0, 0]", "[0, 0, 0]"));
@@ -264,7 +266,7 @@ TEST_F(Damaged, Cases) {
       "{seeds: [[1, 2, 3]], register: true}\n";
   const std::vector<std::pair<std::string, std::string>> lies{{"ct.mha", "../ct.mha"}, {"[[1, 2, 3]]", "[]"}};
   expect_handled(folder, {"case/case.yaml", text, text.size(), lies, true},
-                 [](const Path& path) { case_at(path.parent_path()); }, {.cuts = 40, .changes = 300});
+                 [](const Path& path) { case_at(path.parent_path()); }, {.changes = 300, .as_text = true});
 }
 
 TEST_F(Damaged, RealFiles) {
