@@ -50,18 +50,30 @@ class Environments(unittest.TestCase):
         return folder
 
     def marrow(
-        self, *arguments, user=None, limits=(), closed=(), streams=None, without=(), cwd=None, wrapper=(), **variables
+        self,
+        *arguments,
+        user=None,
+        limit=None,
+        closed=(),
+        without=(),
+        cwd=None,
+        wrapper=(),
+        out=None,
+        err=None,
+        **variables
     ):
         """The program in a child that has become what it should be; without a store unless one is named."""
         if user and not self.is_reached_by_others:
             self.skipTest("the program lies where other users cannot reach it")
-        environment = self.program.environment_of(self.folder, **variables)
+        environment = self.program.environment_of(
+            self.folder, **{name: str(value) for name, value in variables.items()}
+        )
         for name in without:
             environment.pop(name, None)
 
         def become():
-            for which, most in limits:
-                resource.setrlimit(which, (most, most))
+            if limit:
+                resource.setrlimit(limit[0], (limit[1], limit[1]))
             if user:
                 os.setgroups([])
                 os.setgid(user)
@@ -69,18 +81,18 @@ class Environments(unittest.TestCase):
             for descriptor in closed:
                 os.close(descriptor)
 
-        streams = streams or {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
-        return subprocess.run(
-            [*wrapper, str(self.program.marrow), *map(str, arguments)],
-            env=environment,
-            cwd=cwd or self.folder,
-            preexec_fn=become,
-            text=True,
-            errors="replace",
-            timeout=400,
-            stdin=subprocess.DEVNULL,
-            **streams
-        )
+        how = {"env": environment, "cwd": cwd or self.folder, "preexec_fn": become, "stdin": subprocess.DEVNULL}
+        how.update(stdout=out or subprocess.PIPE, stderr=err or subprocess.PIPE)
+        command = [*wrapper, str(self.program.marrow), *map(str, arguments)]
+        return subprocess.run(command, text=True, errors="replace", timeout=400, **how)
+
+    def run_in(self, folder, threads=None, **how):
+        """A run; its results are to be in the folder, or in its default one."""
+        more = {"threads": threads} if threads else {}
+        return self.marrow(*self.run_subject.arguments(folder, **more), **how)
+
+    def compare_in(self, folder, more=("--quiet",), **how):
+        return self.marrow(*self.compare_subject.arguments(folder, more=more), **how)
 
     def said(self, result):
         return "code %d: %s" % (result.returncode, result.stderr)
@@ -105,28 +117,28 @@ class Environments(unittest.TestCase):
         self.assert_sentence(result)
         self.assertEqual(self.run_subject.complaints_of(out, False), [])
 
+    def assert_compared_or_says_so(self, result, out):
+        if result.returncode != 0:
+            self.assert_sentence(result)
+        self.assertEqual(self.compare_subject.complaints_of(out, result.returncode == 0, False), [], self.said(result))
+
     @needs_root
     def test_an_ordinary_user(self):
-        home, out = self.owned("home", USER), self.owned("work", USER) / "out"
-        result = self.marrow(*self.run_subject.arguments(out), user=USER, HOME=str(home), without=["MARROW_CACHE"])
-        self.assert_passes(result, out)
+        home, work = self.owned("home", USER), self.owned("work", USER)
+        how = {"user": USER, "HOME": home, "without": ["MARROW_CACHE"]}
+        self.assert_passes(self.run_in(work / "out", **how), work / "out")
         self.assertTrue((home / ".cache" / "marrow").is_dir())
-        again = self.marrow(
-            *self.run_subject.arguments(out.parent / "again"), user=USER, HOME=str(home), without=["MARROW_CACHE"]
-        )
-        self.assert_passes(again, out.parent / "again")
+        again = self.run_in(work / "again", **how)
+        self.assert_passes(again, work / "again")
         self.assertIn("cached", again.stdout)
 
     @needs_root
     def test_without_home(self):
-        before, work = pathlib.Path("/tmp/.cache/marrow").exists(), self.owned("work", USER)
-        result = self.marrow(
-            *self.run_subject.arguments(work / "out"), user=USER, without=["HOME", "MARROW_CACHE", "XDG_CACHE_HOME"]
-        )
+        for_all = pathlib.Path("/tmp/.cache/marrow")
+        before, work = for_all.exists(), self.owned("work", USER)
+        result = self.run_in(work / "out", user=USER, without=["HOME", "MARROW_CACHE", "XDG_CACHE_HOME"])
         self.assert_passes(result, work / "out")
-        self.assertEqual(
-            pathlib.Path("/tmp/.cache/marrow").exists(), before, "/tmp is for all: what lies there may be anyone's"
-        )
+        self.assertEqual(for_all.exists(), before, "/tmp is for all: what lies there may be anyone's")
         self.assertRegex(result.stderr, r"(?m)^marrow: .*not kept.*home")
 
     def test_empty_variables(self):
@@ -134,12 +146,10 @@ class Environments(unittest.TestCase):
             with self.subTest(names):
                 work = self.folder / "-".join(names)
                 work.mkdir()
-                result = self.marrow(
-                    *self.run_subject.arguments(work / "out"), cwd=work, **{name: "" for name in names}
-                )
-                self.assert_passes(result, work / "out")
+                empty = {name: "" for name in names}
+                self.assert_passes(self.run_in(work / "out", cwd=work, **empty), work / "out")
                 self.assertEqual([path.name for path in work.iterdir()], ["out"], "only the folder that was asked for")
-                listed = self.marrow("list", cwd=work, **{name: "" for name in names})
+                listed = self.marrow("list", cwd=work, **empty)
                 self.assertEqual(listed.returncode, 0, self.said(listed))
 
     @staticmethod
@@ -155,46 +165,23 @@ class Environments(unittest.TestCase):
         work = self.owned("work", USER)
         for most in (1, 2, 4, 8):
             with self.subTest(most):
-                out = work / str(most)
+                how = {"user": USER, "limit": (resource.RLIMIT_NPROC, most)}
+                out, compared = work / str(most), work / ("compare-%d" % most)
                 self.wait_for_end_of_all(USER)
-                result = self.marrow(
-                    *self.run_subject.arguments(out, threads=16),
-                    user=USER,
-                    limits=[(resource.RLIMIT_NPROC, most)],
-                    MARROW_CACHE=str(work / ("store-%d" % most))
-                )
+                result = self.run_in(out, threads=16, MARROW_CACHE=work / ("store-%d" % most), **how)
                 self.assert_passes_or_says_so(result, out)
                 self.wait_for_end_of_all(USER)
-                compared = work / ("compare-%d" % most)
-                result = self.marrow(
-                    *self.compare_subject.arguments(compared, more=["--quiet"]),
-                    user=USER,
-                    limits=[(resource.RLIMIT_NPROC, most)],
-                    MARROW_CACHE=str(work / ("compare-store-%d" % most))
-                )
+                result = self.compare_in(compared, MARROW_CACHE=work / ("compare-store-%d" % most), **how)
                 self.assert_compared_or_says_so(result, compared)
-
-    def assert_compared_or_says_so(self, result, out):
-        if result.returncode != 0:
-            self.assert_sentence(result)
-        self.assertEqual(self.compare_subject.complaints_of(out, result.returncode == 0, False), [], self.said(result))
 
     def limited(self, which, amounts):
         for most in sample(amounts, 4):
             with self.subTest(most):
-                out = self.folder / ("out-%d" % most)
-                result = self.marrow(
-                    *self.run_subject.arguments(out),
-                    limits=[(which, most)],
-                    MARROW_CACHE=str(self.folder / ("store-%d" % most))
-                )
-                self.assert_passes_or_says_so(result, out)
-                compared = self.folder / ("compare-%d" % most)
-                result = self.marrow(
-                    *self.compare_subject.arguments(compared, more=["--quiet"]),
-                    limits=[(which, most)],
-                    MARROW_CACHE=str(self.folder / ("compare-store-%d" % most))
-                )
+                out, compared = self.folder / ("out-%d" % most), self.folder / ("compare-%d" % most)
+                store = self.folder / ("store-%d" % most)
+                self.assert_passes_or_says_so(self.run_in(out, limit=(which, most), MARROW_CACHE=store), out)
+                store = self.folder / ("compare-store-%d" % most)
+                result = self.compare_in(compared, limit=(which, most), MARROW_CACHE=store)
                 if result.returncode != 127:
                     self.assert_compared_or_says_so(result, compared)
 
@@ -211,8 +198,7 @@ class Environments(unittest.TestCase):
         for closed in ([0], [1], [2], [1, 2], [0, 1, 2]):
             with self.subTest(closed):
                 out = self.folder / "".join(map(str, closed))
-                result = self.marrow(*self.run_subject.arguments(out), closed=closed)
-                self.assert_passes(result, out)
+                self.assert_passes(self.run_in(out, closed=closed), out)
                 compared = self.folder / ("compare" + out.name)
                 result = self.marrow(*self.compare_subject.arguments(compared), closed=closed)
                 self.assertEqual(result.returncode, 0, self.said(result))
@@ -220,11 +206,8 @@ class Environments(unittest.TestCase):
 
     def test_full_streams(self):
         with open("/dev/full", "w") as full:
-            out = self.folder / "out"
-            self.assert_passes(
-                self.marrow(*self.run_subject.arguments(out), streams={"stdout": subprocess.PIPE, "stderr": full}), out
-            )
-            result = self.marrow("list", "--json", streams={"stdout": full, "stderr": subprocess.PIPE})
+            self.assert_passes(self.run_in(self.folder / "out", err=full), self.folder / "out")
+            result = self.marrow("list", "--json", out=full)
             self.assert_sentence(result, [1])
             self.assertIn("could not be written", result.stderr)
 
@@ -232,88 +215,49 @@ class Environments(unittest.TestCase):
         reader, writer = os.pipe()
         os.close(reader)
         with open(writer, "w") as closed:
-            self.assert_passes(
-                self.marrow(
-                    *self.run_subject.arguments(self.folder / "out"), streams={"stdout": closed, "stderr": closed}
-                ),
-                self.folder / "out",
-            )
+            self.assert_passes(self.run_in(self.folder / "out", out=closed, err=closed), self.folder / "out")
 
     @needs_root
     def test_read_only_folders(self):
         work, read_only = self.owned("work", USER), self.owned("read-only", USER, 0o555)
-        result = self.marrow(
-            *self.run_subject.arguments(None), user=USER, cwd=read_only, MARROW_CACHE=str(work / "store")
-        )
+        how = {"user": USER, "cwd": read_only}
+        result = self.run_in(None, MARROW_CACHE=work / "store", **how)
         self.assert_sentence(result)
         self.assertIn("cannot make the output folder", result.stderr)
-        result = self.marrow(
-            *self.run_subject.arguments(work / "out"), user=USER, cwd=read_only, MARROW_CACHE=str(read_only / "store")
-        )
+        result = self.run_in(work / "out", MARROW_CACHE=read_only / "store", **how)
         self.assert_passes(result, work / "out")
         self.assertIn("kept", result.stderr)
-        result = self.marrow(
-            *self.compare_subject.arguments(None), user=USER, cwd=read_only, MARROW_CACHE=str(work / "store")
-        )
-        self.assert_sentence(result)
+        self.assert_sentence(self.marrow(*self.compare_subject.arguments(None), MARROW_CACHE=work / "store", **how))
 
     def test_a_working_folder_that_is_gone(self):
         gone = self.folder / "gone"
         gone.mkdir()
-        result = self.marrow(
-            *self.run_subject.arguments(self.folder / "out"),
-            wrapper=["sh", "-c", 'rmdir "%s"; exec "$0" "$@"' % gone],
-            cwd=gone
-        )
-        self.assert_passes_or_says_so(result, self.folder / "out")
+        wrapper = ["sh", "-c", 'rmdir "%s"; exec "$0" "$@"' % gone]
+        self.assert_passes_or_says_so(self.run_in(self.folder / "out", wrapper=wrapper, cwd=gone), self.folder / "out")
 
     def test_a_name_that_is_too_long(self):
-        result = self.marrow(*self.run_subject.arguments(self.folder / ("x" * 300)))
-        self.assert_sentence(result)
+        self.assert_sentence(self.run_in(self.folder / ("x" * 300)))
 
     @unittest.skipUnless(can_mount(), "small disks cannot be mounted here")
     def test_full_disk(self):
-        wrapper = [
-            "unshare",
-            "-m",
-            "sh",
-            "-c",
-            (
-                'mount -t tmpfs -o "$0" tmpfs full && cp -r full-before/. full/ && "$@"; code=$?; cp -r full after;'
-                " exit $code"
-            ),
-        ]
+        mounted = 'mount -t tmpfs -o "$0" tmpfs full && cp -r full-before/. full/ && "$@"; code=$?; cp -r full after;'
+        wrapper = ["unshare", "-m", "sh", "-c", mounted + " exit $code"]
         for options in ("size=4k", "size=16k", "size=28k", "size=40k", "nr_inodes=6", "nr_inodes=20"):
             for what in ("out", "store", "compare"):
                 with self.subTest(options=options, what=what):
                     work = self.folder / (options + what)
-                    (work / "full").mkdir(parents=True)
+                    full, after = work / "full", work / "after" / "out"
+                    full.mkdir(parents=True)
                     (work / "full-before").mkdir()
-                    full, store = work / "full", work / "store"
+                    how = {"wrapper": [*wrapper, options], "cwd": work}
                     if what == "store":
-                        result = self.marrow(
-                            *self.run_subject.arguments(work / "out"),
-                            wrapper=[*wrapper, options],
-                            cwd=work,
-                            MARROW_CACHE=str(full / "store")
-                        )
-                        self.assert_passes(result, work / "out")
+                        self.assert_passes(self.run_in(work / "out", MARROW_CACHE=full / "store", **how), work / "out")
                     elif what == "out":
-                        result = self.marrow(
-                            *self.run_subject.arguments(full / "out"),
-                            wrapper=[*wrapper, options],
-                            cwd=work,
-                            MARROW_CACHE=str(store)
-                        )
-                        self.assert_passes_or_says_so(result, work / "after" / "out")
+                        result = self.run_in(full / "out", MARROW_CACHE=work / "store", **how)
+                        self.assert_passes_or_says_so(result, after)
                     else:
-                        result = self.marrow(
-                            *self.compare_subject.arguments(full / "out", more=["--quiet"]),
-                            wrapper=[*wrapper, options],
-                            cwd=work,
-                            MARROW_CACHE=str(store)
-                        )
-                        self.assert_compared_or_says_so(result, work / "after" / "out")
+                        result = self.compare_in(full / "out", MARROW_CACHE=work / "store", **how)
+                        self.assert_compared_or_says_so(result, after)
 
     @needs_root
     def test_two_users_of_one_store(self):
@@ -321,7 +265,7 @@ class Environments(unittest.TestCase):
         store = self.owned("store", USER, 0o777)
         for user in (USER, OTHER_USER, USER):
             work = self.owned("work-%d-%d" % (user, len(list(self.folder.iterdir()))), user)
-            result = self.marrow(*self.run_subject.arguments(work / "out"), user=user, MARROW_CACHE=str(store))
+            result = self.run_in(work / "out", user=user, MARROW_CACHE=store)
             self.assert_passes(result, work / "out")
             if user == OTHER_USER:
                 self.assertNotIn("cached", result.stdout)
@@ -338,18 +282,14 @@ def main():
     with program_of(options) as program:
         program.scratch.chmod(0o755)
         Environments.program = program
-        tried = (
-            subprocess.run(["test", "-x", str(program.marrow)], preexec_fn=lambda: os.setuid(USER))
-            if os.getuid() == 0
-            else None
-        )
-        Environments.is_reached_by_others = tried is not None and tried.returncode == 0
+        if os.getuid() == 0:
+            tried = subprocess.run(["test", "-x", str(program.marrow)], preexec_fn=lambda: os.setuid(USER))
+            Environments.is_reached_by_others = tried.returncode == 0
         Run(program).reference()
         Compare(program).reference()
         loaded = unittest.defaultTestLoader.loadTestsFromTestCase(Environments)
-        chosen = unittest.TestSuite(
-            test for test in loaded if not options.tests or any(name in test.id() for name in options.tests)
-        )
+        is_chosen = lambda test: not options.tests or any(name in test.id() for name in options.tests)
+        chosen = unittest.TestSuite(filter(is_chosen, loaded))
         return 0 if unittest.TextTestRunner(verbosity=2).run(chosen).wasSuccessful() else 1
 
 

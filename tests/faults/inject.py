@@ -15,27 +15,8 @@ import sys
 from starting import ALL, arguments_parser, conclude, program_of
 from subjects import SENTENCE, Collect, Compare, Run
 
-CALLS = [
-    "open",
-    "read",
-    "write",
-    "close",
-    "rename",
-    "mkdir",
-    "remove",
-    "truncate",
-    "fsync",
-    "lock",
-    "mmap",
-    "malloc",
-    "loader_malloc",
-    "thread",
-    "fork",
-    "exec",
-    "pipe",
-    "dup",
-    "poll",
-]
+CALLS = """open read write close rename mkdir remove truncate fsync lock mmap malloc loader_malloc thread fork exec pipe dup
+poll""".split()
 Fault = collections.namedtuple("Fault", "subject where call n times below")
 HELP = (
     "SUBJECT/main|children/CALL/N/1|forever/PLACE: only this fault, as the list of failures names it; PLACE is"
@@ -63,19 +44,11 @@ class Injector:
         """{(where, call): how often it is called when nothing fails}"""
         folder = self.new_folder()
         subject.prepare(folder)
-        result = self.program.run(
-            subject.command(folder),
-            folder,
-            LD_PRELOAD=str(self.program.fault_library),
-            FAULT_COUNT_FILE=str(folder / "counts"),
-        )
+        counting = {"LD_PRELOAD": str(self.program.fault_library), "FAULT_COUNT_FILE": str(folder / "counts")}
+        result = self.program.run(subject.command(folder), folder, **counting)
         assert result.returncode == 0, result.stderr
         table = struct.unpack("<%dQ" % (2 * len(CALLS)), (folder / "counts").read_bytes())
-        return {
-            (where, call): table[row * len(CALLS) + i]
-            for row, where in enumerate(("main", "children"))
-            for i, call in enumerate(CALLS)
-        }
+        return dict(zip([(where, call) for where in ("main", "children") for call in CALLS], table))
 
     def groups(self, names, calls):
         """Lists of faults that differ in n alone."""
@@ -109,9 +82,8 @@ class Injector:
             return ["it did not end"], ""
         code, complaints = result.returncode, []
         if code not in (0, 1, 2, 130):
-            complaints.append(
-                "it was ended by %s" % signal.Signals(-code).name if code < 0 else "its exit code is %d" % code
-            )
+            ended_by = "it was ended by %s" % signal.Signals(-code).name if code < 0 else ""
+            complaints.append(ended_by or "its exit code is %d" % code)
         elif code != 0 and not SENTENCE.search(result.stderr):
             complaints.append("exit code %d without a sentence" % code)
         if fault.below == "store" and fault.subject == "run" and code != 0:
@@ -139,9 +111,8 @@ def chosen_faults(injector, options):
             # A draw of its own: how often a call is made may differ, and must not change which of the others fails.
             faults.append(random.Random("%d %s" % (injector.seed, group[0])).choice(group))
             continue
-        rare = group[0].call == "loader_malloc" or (
-            group[0].call == "malloc" and (group[0].times == "forever" or group[0].subject == "compare")
-        )
+        slow = group[0].times == "forever" or group[0].subject == "compare"
+        rare = group[0].call == "loader_malloc" or (group[0].call == "malloc" and slow)
         most = options.most if rare else len(group)
         faults += group if len(group) <= most else injector.chance.sample(group, most)
     if options.all:
@@ -151,18 +122,10 @@ def chosen_faults(injector, options):
 
 def main():
     parser = arguments_parser(__doc__)
-    parser.add_argument(
-        "--trials",
-        type=int,
-        default=70 if ALL else 25,
-        help="faults of a sample, each of another kind (default: 25; 70 with MARROW_TEST_ALL=1)",
-    )
-    parser.add_argument(
-        "--most",
-        type=int,
-        default=1000,
-        help="with --all: most allocations that fail of a comparison, of a loader, or for ever (default: 1000)",
-    )
+    trials = "faults of a sample, each of another kind (default: 25; 70 with MARROW_TEST_ALL=1)"
+    parser.add_argument("--trials", type=int, default=70 if ALL else 25, help=trials)
+    most = "with --all: most allocations that fail of a comparison, of a loader, or for ever (default: 1000)"
+    parser.add_argument("--most", type=int, default=1000, help=most)
     parser.add_argument("--subjects", nargs="*", help="run, compare, gc (default: all)")
     parser.add_argument("--calls", nargs="*", choices=CALLS, metavar="CALL", help="only these: " + " ".join(CALLS))
     parser.add_argument("--only", help=HELP)

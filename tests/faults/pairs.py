@@ -42,27 +42,15 @@ class Pairs:
     def pairs(self, count):
         names = list(self.kinds)
         for number in range(count):  # as many of each kind, most of them at once, some a little later
-            yield Pair(
-                number,
-                names[number % len(names)],
-                self.chance.choice([0, 0, 0, self.chance.uniform(0, 0.05), self.chance.uniform(0, 0.4)]),
-            )
+            gap_s = self.chance.choice([0, 0, 0, self.chance.uniform(0, 0.05), self.chance.uniform(0, 0.4)])
+            yield Pair(number, names[number % len(names)], gap_s)
 
     def both(self, folder, first, second, gap_s):
+        how = {"stdin": subprocess.DEVNULL, "stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
+        how.update(env=self.program.environment_of(folder), cwd=folder, text=True, errors="replace")
         processes = []
         for arguments in (first, second):
-            processes.append(
-                subprocess.Popen(
-                    [str(self.program.marrow), *map(str, arguments)],
-                    env=self.program.environment_of(folder),
-                    cwd=folder,
-                    text=True,
-                    errors="replace",
-                    stdin=subprocess.DEVNULL,
-                    stdout=subprocess.PIPE,
-                    stderr=subprocess.PIPE,
-                )
-            )
+            processes.append(subprocess.Popen([str(self.program.marrow), *map(str, arguments)], **how))
             time.sleep(gap_s if arguments is first else 0)
         with concurrent.futures.ThreadPoolExecutor(2) as pool:
             texts = list(pool.map(lambda process: process.communicate(timeout=400), processes))
@@ -144,11 +132,8 @@ class Pairs:
             yield from self.compare.complaints_of(out, True, True, experiment)
 
     def comparisons_one_store(self, folder, gap_s):
-        ended = self.both(
-            folder,
-            *(self.compare.arguments(folder / str(i), experiment) for i, experiment in enumerate(EXPERIMENTS)),
-            gap_s
-        )
+        both = [self.compare.arguments(folder / str(i), experiment) for i, experiment in enumerate(EXPERIMENTS)]
+        ended = self.both(folder, *both, gap_s)
         yield from self.both_went_well(ended)
         for i, experiment in enumerate(EXPERIMENTS):
             yield from self.compare.complaints_of(folder / str(i), True, True, experiment)
@@ -180,9 +165,8 @@ def main():
             for pair, complaints in zip(chosen, pool.map(pairs.try_pair, chosen)):
                 counts[(pair.kind, "failed" if complaints else "good")] += 1
                 if complaints:
-                    failures.append(
-                        "%d: %s, %.3f s apart: %s" % (pair.number, pair.kind, pair.gap_s, "; ".join(complaints))
-                    )
+                    what = (pair.number, pair.kind, pair.gap_s, "; ".join(complaints))
+                    failures.append("%d: %s, %.3f s apart: %s" % what)
                     print(failures[-1], flush=True)
     for (kind, end), count in sorted(counts.items()):
         print("%5d  %-32s %s" % (count, kind, end))

@@ -51,11 +51,8 @@ class Signals:
     def trials(self, count):
         for number in range(count):
             subject, what = self.chance.choice(list(self.subjects)), self.chance.choice(KINDS)
-            target = (
-                self.chance.choice(["program", "group", "worker"])
-                if what != CLOSED
-                else self.chance.choice(["stdout", "stderr", "both"])
-            )
+            targets = ["program", "group", "worker"] if what != CLOSED else ["stdout", "stderr", "both"]
+            target = self.chance.choice(targets)
             yield Trial(number, subject, what, target, self.chance.uniform(0, 1.1 * self.seconds[subject]))
 
     def disturb(self, process, trial, mark, ends):
@@ -79,30 +76,19 @@ class Signals:
         return True
 
     def try_signal(self, trial):
-        subject, folder, mark = (
-            self.subjects[trial.subject],
-            self.program.scratch / ("signal-%d" % trial.number),
-            "MARROW_TRIAL=%s" % uuid.uuid4(),
-        )
+        subject, mark = self.subjects[trial.subject], "MARROW_TRIAL=%s" % uuid.uuid4()
+        folder = self.program.scratch / ("signal-%d" % trial.number)
         folder.mkdir()
         subject.prepare(folder)
         environment = self.program.environment_of(folder, MARROW_TRIAL=mark.partition("=")[2])
-        process = subprocess.Popen(
-            [str(self.program.marrow), *map(str, subject.command(folder))],
-            env=environment,
-            cwd=folder,
-            stdin=subprocess.DEVNULL,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE,
-            start_new_session=True,
-        )
+        how = {"stdin": subprocess.DEVNULL, "stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
+        command = [str(self.program.marrow), *map(str, subject.command(folder))]
+        process = subprocess.Popen(command, env=environment, cwd=folder, start_new_session=True, **how)
         with concurrent.futures.ThreadPoolExecutor(2) as readers:
             time.sleep(trial.seconds)
             came = process.poll() is None and self.disturb(process, trial, mark, (process.stdout, process.stderr))
-            texts = [
-                readers.submit(stream.read) if not stream.closed else None
-                for stream in (process.stdout, process.stderr)
-            ]
+            streams = (process.stdout, process.stderr)
+            texts = [readers.submit(stream.read) if not stream.closed else None for stream in streams]
             try:
                 process.wait(400)
                 complaints = []
@@ -178,10 +164,8 @@ def main():
                 name = trial.what if trial.what == CLOSED else trial.what.name
                 ends[(name, trial.target, code)] += 1
                 if complaints:
-                    failures.append(
-                        "%d: %s to the %s of a %s after %.3f s: %s"
-                        % (trial.number, name, trial.target, trial.subject, trial.seconds, "; ".join(complaints))
-                    )
+                    what = (trial.number, name, trial.target, trial.subject, trial.seconds, "; ".join(complaints))
+                    failures.append("%d: %s to the %s of a %s after %.3f s: %s" % what)
                     print(failures[-1], "|", errors.strip()[-200:], flush=True)
     for (name, target, code), count in sorted(ends.items()):
         print("%5d  %-15s %-8s code %d" % (count, name, target, code))

@@ -22,12 +22,9 @@ def arguments_parser(description):
     parser = argparse.ArgumentParser(description=description)
     parser.add_argument("--build", type=pathlib.Path, default=BUILD, help="the build folder")
     parser.add_argument("--all", action="store_true", help="the whole, not a sample")
-    parser.add_argument(
-        "--seed",
-        type=int,
-        default=random.Random(SEED).randrange(10**6),
-        help="of what is drawn by chance (default: the same in each run)",
-    )
+    drawn = random.Random(SEED).randrange(10**6)
+    said = "of what is drawn by chance (default: the same in each run)"
+    parser.add_argument("--seed", type=int, default=drawn, help=said)
     parser.add_argument("--jobs", type=int, default=2, help="how many at once (default: 2)")
     return parser
 

@@ -12,16 +12,7 @@ from harness import formats
 
 SENTENCE = re.compile(r"^(marrow: (error: |stopped)|\S+: error: ).{8}", re.MULTILINE)
 # A folder of libraries with the few plugins that are used: the manifests of all of them are most of a small run's work.
-PLUGINS = [
-    "read_image",
-    "read_mesh",
-    "read_volume",
-    "write_case",
-    "write_mesh",
-    "write_picture",
-    "write_text",
-    "write_volume",
-]
+PLUGINS = "read_image read_mesh read_volume write_case write_mesh write_picture write_text write_volume".split()
 
 PIPELINE = """marrow: 1
 name: small
@@ -66,9 +57,8 @@ def stl(facets):
 def write_data(folder):
     (folder / "other").mkdir(parents=True)  # an experiment of the same name with other values
     (folder / "text").write_text("a file that counts by its content")
-    (folder / "picture.png").write_bytes(
-        formats.png(16, 12, [(7 * u + 13 * v) % 256 for v in range(12) for u in range(16)])
-    )
+    grey = [(7 * u + 13 * v) % 256 for v in range(12) for u in range(16)]
+    (folder / "picture.png").write_bytes(formats.png(16, 12, grey))
     (folder / "ct.mha").write_bytes(formats.mha(formats.straight((4, 4, 4)), range(64), "MET_FLOAT"))
     (folder / "mesh.stl").write_text(stl(5))
     small = PIPELINE % {"data": folder}
@@ -95,15 +85,12 @@ class Program:
         for name in PLUGINS:
             for file in (build / "lib" / "marrow").glob("marrow_%s.*" % name):
                 (libraries / "marrow" / file.name).symlink_to(file)
-        for file in [
-            *(build / "tests" / "plugins").glob("marrow_test_*"),
-            *(build / "tests" / "fault_plugins").glob("marrow_small_case.*"),
-        ]:
-            (libraries / "marrow" / file.name).symlink_to(file)
+        for pattern in ("plugins/marrow_test_*", "fault_plugins/marrow_small_case.*"):
+            for file in (build / "tests").glob(pattern):
+                (libraries / "marrow" / file.name).symlink_to(file)
         (scratch / "home").mkdir()
-        self.environment = {
-            key: value for key, value in os.environ.items() if not key.startswith(("MARROW_", "FAULT_", "XDG_"))
-        }
+        foreign = ("MARROW_", "FAULT_", "XDG_")
+        self.environment = {key: value for key, value in os.environ.items() if not key.startswith(foreign)}
         self.environment.update(LD_LIBRARY_PATH=str(libraries), HOME=str(scratch / "home"))
         write_data(self.data)
 
@@ -111,16 +98,9 @@ class Program:
         return {**self.environment, "MARROW_CACHE": str(folder / "store"), **more}
 
     def run(self, arguments, folder, **more):
-        return subprocess.run(
-            [str(self.marrow), *map(str, arguments)],
-            capture_output=True,
-            text=True,
-            errors="replace",
-            cwd=folder,
-            timeout=400,
-            stdin=subprocess.DEVNULL,
-            env=self.environment_of(folder, **more),
-        )
+        how = {"capture_output": True, "text": True, "errors": "replace", "stdin": subprocess.DEVNULL, "timeout": 400}
+        command = [str(self.marrow), *map(str, arguments)]
+        return subprocess.run(command, cwd=folder, env=self.environment_of(folder, **more), **how)
 
     def damaged_entries(self, folder):
         result = self.run(["cache", "info"], folder)
@@ -155,16 +135,9 @@ class Run:
         self.program, self.pipeline = program, pipeline
 
     def arguments(self, out, seed=1, threads=2):
-        return [
-            "run",
-            self.program.data / self.pipeline,
-            "data=%s" % (self.program.data / "text"),
-            "--seed",
-            seed,
-            "--threads",
-            threads,
-            *(["--out", out] if out else []),
-        ]
+        data = self.program.data
+        words = ["run", data / self.pipeline, "data=%s" % (data / "text"), "--seed", seed, "--threads", threads]
+        return words + (["--out", out] if out else [])
 
     def prepare(self, folder):
         pass
@@ -186,16 +159,10 @@ class Run:
     def complaints_of(self, out, is_whole, seed=1):
         """What a run's folder holds that it should not; all of its outputs where it said that all went well."""
         reference = self.reference(seed)
-        outputs = (
-            {name: content for name, content in bytes_below(out).items() if name.startswith("outputs")}
-            if out.is_dir()
-            else {}
-        )
-        complaints = [
-            "%s is not what it should be (%d bytes)" % (name, len(content))
-            for name, content in outputs.items()
-            if reference.get(name) != content
-        ]
+        found = bytes_below(out).items() if out.is_dir() else []
+        outputs = {name: content for name, content in found if name.startswith("outputs")}
+        wrong = [(name, len(content)) for name, content in outputs.items() if reference.get(name) != content]
+        complaints = ["%s is not what it should be (%d bytes)" % one for one in wrong]
         complaints += broken_json(out)
         if is_whole:
             complaints += ["%s is not there" % name for name in reference if name not in outputs]
@@ -221,16 +188,8 @@ class Compare:
         self.program = program
 
     def arguments(self, out, experiment="small-experiment.yaml", more=()):
-        return [
-            "compare",
-            self.program.data / experiment,
-            "--jobs",
-            2,
-            "--time-limit",
-            60,
-            *more,
-            *(["--out", out] if out else []),
-        ]
+        words = ["compare", self.program.data / experiment, "--jobs", 2, "--time-limit", 60, *more]
+        return words + (["--out", out] if out else [])
 
     def prepare(self, folder):
         pass

@@ -28,17 +28,8 @@ def tiff(width, height, pages):
     data = struct.pack("<2sHI", b"II", 42, 8)
     for number, page in enumerate(pages):
         values = struct.pack("<%dH" % len(page), *page)
-        tags = [
-            (256, 3, width),
-            (257, 3, height),
-            (258, 3, 16),
-            (259, 3, 1),
-            (262, 3, 1),
-            (273, 4, 0),
-            (277, 3, 1),
-            (278, 3, height),
-            (279, 4, len(values)),
-        ]
+        tags = [(256, 3, width), (257, 3, height), (258, 3, 16), (259, 3, 1), (262, 3, 1), (273, 4, 0), (277, 3, 1)]
+        tags += [(278, 3, height), (279, 4, len(values))]
         begin = len(data) + 2 + 12 * len(tags) + 4
         data += struct.pack("<H", len(tags))
         for tag, kind, value in tags:
@@ -49,28 +40,19 @@ def tiff(width, height, pages):
 
 def straight(size, spacing_mm=(1.0, 1.0, 1.0), origin_mm=(0.0, 0.0, 0.0)):
     """The grid of a CT along the axes of the world."""
-    return {
-        "size": list(size),
-        "spacing_mm": list(spacing_mm),
-        "origin_mm": list(origin_mm),
-        "direction": [[1, 0, 0], [0, 1, 0], [0, 0, 1]],
-    }
+    grid = {"size": list(size), "spacing_mm": list(spacing_mm), "origin_mm": list(origin_mm)}
+    return {**grid, "direction": [[1, 0, 0], [0, 1, 0], [0, 0, 1]]}
 
 
 def mha(grid, values, kind="MET_SHORT"):
     """A MetaImage. grid: {size, spacing_mm, origin_mm, direction: rows}; values: x runs fastest."""
     columns = [grid["direction"][row][column] for column in range(3) for row in range(3)]
+    words = [" ".join(map(repr, part)) for part in (columns, grid["origin_mm"], grid["spacing_mm"])]
+    words.append(" ".join(map(str, grid["size"])))
     header = (
         "ObjectType = Image\nNDims = 3\nBinaryData = True\nBinaryDataByteOrderMSB = False\nCompressedData = False\n"
         "TransformMatrix = %s\nOffset = %s\nElementSpacing = %s\nDimSize = %s\nElementType = %s\n"
-        "ElementDataFile = LOCAL\n"
-        % (
-            " ".join(map(repr, columns)),
-            " ".join(map(repr, grid["origin_mm"])),
-            " ".join(map(repr, grid["spacing_mm"])),
-            " ".join(map(str, grid["size"])),
-            kind,
-        )
+        "ElementDataFile = LOCAL\n" % (*words, kind)
     )
     return header.encode() + struct.pack("<%d%s" % (len(values), {"MET_SHORT": "h", "MET_FLOAT": "f"}[kind]), *values)
 
@@ -85,18 +67,10 @@ def element(group, number, kind, value):
 
 def dicom(width, height, values, elements, meta=()):
     """A grey DICOM image of 16 bits from its bytes. Further elements, also of the meta header: {tag: (kind, value)}."""
-    elements = {
-        (0x28, 2): ("US", 1),
-        (0x28, 4): ("CS", "MONOCHROME2"),
-        (0x28, 0x10): ("US", height),
-        (0x28, 0x11): ("US", width),
-        (0x28, 0x100): ("US", 16),
-        (0x28, 0x101): ("US", 16),
-        (0x28, 0x102): ("US", 15),
-        (0x28, 0x103): ("US", 0),
-        (0x7FE0, 0x10): ("OW", values),
-        **elements,
-    }
+    numbers = {2: 1, 0x10: height, 0x11: width, 0x100: 16, 0x101: 16, 0x102: 15, 0x103: 0}
+    image = {(0x28, number): ("US", value) for number, value in numbers.items()}
+    image.update({(0x28, 4): ("CS", "MONOCHROME2"), (0x7FE0, 0x10): ("OW", values)})
+    elements = {**image, **elements}
     meta = {(2, 1): ("OB", b"\0\1"), (2, 16): ("UI", "1.2.840.10008.1.2.1"), **dict(meta)}
     written = lambda part: b"".join(element(*tag, *value) for tag, value in sorted(part.items()))
     length = element(2, 0, "UL", struct.pack("<I", len(written(meta))))

@@ -1,24 +1,23 @@
 // SPDX-License-Identifier: Apache-2.0
 // From images to the calibration: the beads are found and told apart, and the device is calibrated from them.
-#include <gtest/gtest.h>
 
 #include <cstdio>
 #include <map>
 #include <opencv2/imgproc.hpp>
 
 #include "marrow/read/calibration_file.hpp"
-#include "shipped.hpp"
 #include "tests/plugins/camera/boards.hpp"
-#include "tests/plugins/read/files.hpp"
+#include "tests/plugins/read/damage.hpp"
+#include "tests/plugins/read/reading.hpp"
 #include "tests/plugins/write/writing.hpp"
 
 namespace bead_board_test {
 
 using namespace marrow;
-using marrow::test::kBoardFile;
-using marrow::test::put;
-using marrow::test::TemporaryFolder;
-using marrow::test::with;
+using namespace marrow::test;
+using Eigen::Vector3d, Eigen::Vector2d;
+using BeadBoard = InAFolder;
+using BoardFile = InAFolder;
 
 struct Exposed {
   calibration::Board board = calibration::read_board_file(kBoardFile);
@@ -61,7 +60,7 @@ TEST(FindBeads, CentreIsRightToAHundredthOfAPixel) {
     for (double off : {0.0, 0.25, 0.5, 0.8}) {
       const auto found = calibration::find_beads(one_bead(30 + off, 33 - off, diameter, 2), {24, 0.2});
       ASSERT_EQ(found.size(), 1u) << diameter;
-      EXPECT_LT((found[0].centre_px - Eigen::Vector2d(30 + off, 33 - off)).norm(), 0.02) << diameter << " " << off;
+      EXPECT_LT((found[0].centre_px - Vector2d(30 + off, 33 - off)).norm(), 0.02) << diameter << " " << off;
       EXPECT_NEAR(found[0].diameter_px, diameter, 1) << diameter;
     }
 }
@@ -77,7 +76,7 @@ TEST(FindBeads, LeavesOutWhatIsNoDisc) {
   cv::circle(grey, {40, 180}, 6, 300.f, 2, cv::LINE_AA);             // a ring
   const auto found = calibration::find_beads({grey}, {20, 0.2});
   ASSERT_EQ(found.size(), 1u);
-  EXPECT_LT((found[0].centre_px - Eigen::Vector2d(60, 60)).norm(), 0.05);
+  EXPECT_LT((found[0].centre_px - Vector2d(60, 60)).norm(), 0.05);
   EXPECT_TRUE(calibration::find_beads({cv::Mat1f(50, 50, 7.f)}, {}).empty());
 }
 
@@ -112,7 +111,7 @@ TEST(MatchBoard, EveryMatchIsRightAndFewAreMissing) {
         wrong += (phantom::image_of(exposed.device, exposed.poses[n], match.board_mm[i]) - match.pixels[i]).norm() > 2;
       found += int(match.beads.size());
       for (const auto& bead : exposed.board.beads) {
-        const Eigen::Vector2d at = phantom::image_of(exposed.device, exposed.poses[n], bead.centre_mm);
+        const Vector2d at = phantom::image_of(exposed.device, exposed.poses[n], bead.centre_mm);
         expected += at.x() > 10 && at.y() > 10 && at.x() < 1013 && at.y() < 1013;
       }
     }
@@ -138,7 +137,7 @@ Result calibrated(const List<Image>& images) {
           outputs.at("view_metrics").as_list<Metrics>()};
 }
 
-TEST(BeadBoard, DeviceFromRenderedImages) {
+TEST_F(BeadBoard, DeviceFromRenderedImages) {
   double focal = 0, principal = 0, worst_residual = 0;
   for (std::uint64_t seed = 1; seed <= 3; ++seed) {
     const Exposed exposed = expose(seed, 8);
@@ -161,7 +160,7 @@ TEST(BeadBoard, DeviceFromRenderedImages) {
   EXPECT_LT(worst_residual, 0.1);
 }
 
-TEST(BeadBoard, ImagesReadWithTheCalibrationAreThoseOfAPinhole) {
+TEST_F(BeadBoard, ImagesReadWithTheCalibrationAreThoseOfAPinhole) {
   const Exposed exposed = expose(9, 6);
   const Result result = calibrated(exposed.images);
   std::string names;
@@ -192,7 +191,7 @@ TEST(BeadBoard, ImagesReadWithTheCalibrationAreThoseOfAPinhole) {
   EXPECT_LT(worst, 0.15);
 }
 
-TEST(BeadBoard, NoisyFaintAndBlurredBeads) {
+TEST_F(BeadBoard, NoisyFaintAndBlurredBeads) {
   phantom::Exposure exposure;
   exposure.photons = 60;
   exposure.attenuation_per_mm = 0.5;
@@ -207,7 +206,7 @@ TEST(BeadBoard, NoisyFaintAndBlurredBeads) {
   EXPECT_NEAR(result.calibration.intrinsics(0, 0), exposed.device.intrinsics(0, 0), 5);
 }
 
-TEST(BeadBoard, SaysWhatIsMissing) {
+TEST_F(BeadBoard, SaysWhatIsMissing) {
   const Exposed exposed = expose(7, 3);
   List<Image> two;
   two.add("a", exposed.images[0]);
@@ -228,25 +227,7 @@ TEST(BeadBoard, SaysWhatIsMissing) {
   EXPECT_SAYS(calibrated(mirrored), "only a mirrored image explains where the beads are seen");
 }
 
-TEST(BeadBoard, WritesWhatReadCalibrationReads) {
-  const TemporaryFolder folder;
-  Calibration calibration = phantom::make_device({});
-  calibration.focal_deviation_px = {1.5, 1.25};
-  calibration.principal_deviation_px = {0.1, 0.2};
-  calibration.distortion_deviation = {0.01, 0.02, 0};
-  calibration.residual_px = 0.21;
-  writing::write(calibration, folder / "c.yaml");
-  const Calibration back = read::read_calibration_file(folder / "c.yaml");
-  EXPECT_EQ(back.intrinsics, calibration.intrinsics);
-  EXPECT_EQ(back.distortion.k, calibration.distortion.k);
-  EXPECT_EQ(back.focal_deviation_px, calibration.focal_deviation_px);
-  EXPECT_EQ(back.principal_deviation_px, calibration.principal_deviation_px);
-  EXPECT_EQ(back.distortion_deviation, calibration.distortion_deviation);
-  EXPECT_EQ(back.residual_px, calibration.residual_px);
-}
-
-TEST(BeadBoard, TextOfTheCalibration) {
-  const TemporaryFolder folder;
+TEST_F(BeadBoard, WritesWhatReadCalibrationReads) {
   Calibration calibration;
   calibration.width_px = 640;
   calibration.height_px = 480;
@@ -257,12 +238,19 @@ TEST(BeadBoard, TextOfTheCalibration) {
   calibration.distortion_deviation = {0.01, 0.02, 0};
   calibration.residual_px = 0.21;
   writing::write(calibration, folder / "c.yaml");
-  EXPECT_EQ(test::bytes_of(folder / "c.yaml"),
+  EXPECT_EQ(bytes_of(folder / "c.yaml"),
             "marrow-calibration: 1\nwidth_px: 640\nheight_px: 480\nintrinsics:\n  - [1000.5, 0, 320]\n"
             "  - [0, 1000, 240]\n  - [0, 0, 1]\nradial_distortion: [-0.1, 1e-09, 0]"
             "  # seen = (1 + k1 r^2 + k2 r^4 + k3 r^6) ideal, pixels from the principal point over the focal length\n"
             "deviation:  # one standard deviation\n  focal_px: [1.5, 1.25]\n  principal_px: [0.1, 0.2]\n"
             "  radial_distortion: [0.01, 0.02, 0]\nresidual_px: 0.21\n");
+  const Calibration back = marrow::read::read_calibration_file(folder / "c.yaml");
+  EXPECT_EQ(back.intrinsics, calibration.intrinsics);
+  EXPECT_EQ(back.distortion.k, calibration.distortion.k);
+  EXPECT_EQ(back.focal_deviation_px, calibration.focal_deviation_px);
+  EXPECT_EQ(back.principal_deviation_px, calibration.principal_deviation_px);
+  EXPECT_EQ(back.distortion_deviation, calibration.distortion_deviation);
+  EXPECT_EQ(back.residual_px, calibration.residual_px);
 }
 
 const std::string kPlain = R"(marrow-bead-board: 1
@@ -275,8 +263,7 @@ sides:
     beads: {diameter_mm: 1.5, at_mm: [[25, 10, 40], [30, 28, 40], [15, 20, 40], [50, 20, 40], [25, 55, 40]]}
 )";
 
-TEST(BoardFile, IsCheckedForWhatMakesBeadsFindable) {
-  const TemporaryFolder folder;
+TEST_F(BoardFile, IsCheckedForWhatMakesBeadsFindable) {
   const auto read = [&](const std::string& text) {
     put(folder / "board.yaml", text);
     return calibration::read_board_file(folder / "board.yaml");
@@ -286,28 +273,23 @@ TEST(BoardFile, IsCheckedForWhatMakesBeadsFindable) {
   ASSERT_EQ(board.beads.size(), 18u);
   EXPECT_EQ(board.of_side(1, true).size(), 4u);
   EXPECT_TRUE(board.beads[0].landmark);
-  EXPECT_EQ(board.beads[17].centre_mm, Eigen::Vector3d(25, 55, 40));
-  EXPECT_SAYS(read(with(kPlain, "[60, 40, 0], [10, 50, 0]]", "[60, 40, 0]]")),
-              "side 'a': has 3 landmarks; a side is found in an image by at least 4");
-  EXPECT_SAYS(read(with(kPlain, "diameter_mm: 1.5", "diameter_mm: 2.5")),
-              "landmarks of 3 mm are not told apart from beads of 2.5 mm");
-  std::string small = kPlain;
-  for (int side = 0; side < 2; ++side)
-    small = with(with(small, "diameter_mm: 1.5", "diameter_mm: 0.8"), "diameter_mm: 3", "diameter_mm: 1.1");
+  EXPECT_EQ(board.beads[17].centre_mm, Vector3d(25, 55, 40));
+  const std::string small = with_each(with_each(kPlain, "diameter_mm: 1.5", "diameter_mm: 0.8"), "_mm: 3", "_mm: 1.1");
   EXPECT_EQ(read(small).beads[0].diameter_mm, 1.1);
-  EXPECT_SAYS(read(with(kPlain, "[12, 30, 0]", "[12, 30, 8]")), "out of the side's plane, at most 1 mm expected");
-  EXPECT_SAYS(read(with(kPlain, "[12, 30, 0]", "[12, 30]")),
-              "board.yaml:5:65: side 'a': beads: at_mm: expected a point [x, y, z] in mm, got a list of 2");
-  EXPECT_SAYS(read(with(kPlain, "[12, 30, 0]", "[20, 10.2, 0]")),
-              "beads 5 and 7 (counted as the file lists them) overlap");
-  EXPECT_SAYS(read(with(kPlain, "sides:", "side:")), "board: unknown key 'side'; did you mean 'sides'?");
-  std::string flat = kPlain;
-  for (std::size_t at; (at = flat.find(", 40]")) != std::string::npos;) flat.replace(at, 5, ", 5]");
-  EXPECT_SAYS(read(flat), "the two sides are 5 mm apart; at least 10 mm are needed");
+  expect_faults(folder / "board.yaml", kPlain,
+                {{"[60, 40, 0], [10, 50, 0]]", "[60, 40, 0]]",
+                  "side 'a': has 3 landmarks; a side is found in an image by at least 4"},
+                 {"diameter_mm: 1.5", "diameter_mm: 2.5", "landmarks of 3 mm are not told apart from beads of 2.5 mm"},
+                 {"[12, 30, 0]", "[12, 30, 8]", "out of the side's plane, at most 1 mm expected"},
+                 {"[12, 30, 0]", "[12, 30]",
+                  "board.yaml:5:65: side 'a': beads: at_mm: expected a point [x, y, z] in mm, got a list of 2"},
+                 {"[12, 30, 0]", "[20, 10.2, 0]", "beads 5 and 7 (counted as the file lists them) overlap"},
+                 {"sides:", "side:", "board: unknown key 'side'; did you mean 'sides'?"},
+                 {"", with_each(kPlain, ", 40]", ", 5]"), "the two sides are 5 mm apart; at least 10 mm are needed"}},
+                calibration::read_board_file);
 }
 
-TEST(BoardFile, RefusesBoardsThatLookAlikeWhenTurned) {
-  const TemporaryFolder folder;
+TEST_F(BoardFile, RefusesBoardsThatLookAlikeWhenTurned) {
   std::string text = "marrow-bead-board: 1\nsides:\n";
   for (const auto& [name, z] : std::map<std::string, int>{{"a", 0}, {"b", 40}}) {
     text += "  " + name + ":\n    landmarks: {diameter_mm: 3, at_mm: [";
@@ -323,12 +305,9 @@ TEST(BoardFile, RefusesBoardsThatLookAlikeWhenTurned) {
   put(folder / "board.yaml", text);
   EXPECT_SAYS(calibration::read_board_file(folder / "board.yaml"),
               "side 'a' looks the same when it is turned or mirrored");
-  std::string alike = kPlain;
-  alike = alike.substr(0, alike.find("  b:")) +
-          with(alike.substr(alike.find("  a:"), alike.find("  b:") - alike.find("  a:")), "  a:", "  b:");
-  const std::size_t second = alike.find("  b:");
-  for (std::size_t at; (at = alike.find(", 0]", second)) != std::string::npos;) alike.replace(at, 4, ", 40]");
-  put(folder / "board.yaml", alike);
+  const std::size_t first = kPlain.find("  a:"), second = kPlain.find("  b:");
+  const std::string side = kPlain.substr(first, second - first);
+  put(folder / "board.yaml", kPlain.substr(0, second) + with_each(with(side, "  a:", "  b:"), ", 0]", ", 40]"));
   EXPECT_SAYS(calibration::read_board_file(folder / "board.yaml"), "the two sides look the same");
 }
 

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 // The calibration from known correspondences: exact without noise, as good as the noise allows with it.
-#include <gtest/gtest.h>
 
 #include <algorithm>
 #include <cstdio>
@@ -12,16 +11,17 @@
 namespace calibrate_test {
 
 using namespace marrow;
+using namespace marrow::test;
 using calibration::CalibrationModel;
 using calibration::CalibrationResult;
+using Eigen::Vector3d, Eigen::Vector2d;
 
 TEST(Calibrate, FindsTheExactDeviceWithoutNoise) {
-  const calibration::Board board = calibration::read_board_file(test::kBoardFile);
   phantom::DeviceOptions options;
   options.principal_offset_px = {17, -11};
   const Calibration device = phantom::make_device(options);
-  const auto poses = phantom::draw_board_poses(board, {}, 5);
-  const CalibrationResult fit = calibration::calibrate(test::see_board(board, device, poses, 0, 1), 1024, 1024, {});
+  const auto poses = phantom::draw_board_poses(board(), {}, 5);
+  const CalibrationResult fit = calibration::calibrate(test::see_board(device, poses, 0, 1), 1024, 1024, {});
   // The solver takes pixels as 32-bit numbers, which are right to 6e-5.
   EXPECT_NEAR(fit.calibration.intrinsics(0, 0), device.intrinsics(0, 0), 1e-2);
   EXPECT_NEAR(fit.calibration.intrinsics(1, 1), device.intrinsics(1, 1), 1e-2);
@@ -36,13 +36,12 @@ TEST(Calibrate, FindsTheExactDeviceWithoutNoise) {
 }
 
 TEST(Calibrate, ClosedFormIsExactForADeviceWithoutDistortion) {
-  const calibration::Board board = calibration::read_board_file(test::kBoardFile);
   phantom::DeviceOptions options;
   options.pincushion_percent = 0;
   options.principal_offset_px = {0, 0};
   const Calibration device = phantom::make_device(options);
-  const auto poses = phantom::draw_board_poses(board, {}, 2);
-  const auto views = test::see_board(board, device, poses, 0, 1);
+  const auto poses = phantom::draw_board_poses(board(), {}, 2);
+  const auto views = test::see_board(device, poses, 0, 1);
   for (std::size_t i = 0; i < views.size(); ++i) {
     const auto start = calibration::closed_form_camera(views[i], {511.5, 511.5});
     ASSERT_TRUE(start);
@@ -54,9 +53,8 @@ TEST(Calibrate, ClosedFormIsExactForADeviceWithoutDistortion) {
 }
 
 TEST(Calibrate, TellsAMirroredImage) {
-  const calibration::Board board = calibration::read_board_file(test::kBoardFile);
   const Calibration device = phantom::make_device({});
-  auto views = test::see_board(board, device, phantom::draw_board_poses(board, {}, 3), 0.1, 1);
+  auto views = test::see_board(device, phantom::draw_board_poses(board(), {}, 3), 0.1, 1);
   for (auto& view : views)
     for (auto& pixel : view.pixels) pixel.x() = 1023 - pixel.x();
   EXPECT_SAYS(calibration::calibrate(views, 1024, 1024, {}),
@@ -64,12 +62,11 @@ TEST(Calibrate, TellsAMirroredImage) {
 }
 
 TEST(Calibrate, OneSideAloneDoesNotDetermineACamera) {
-  const calibration::Board board = calibration::read_board_file(test::kBoardFile);
-  auto views = test::see_board(board, phantom::make_device({}), phantom::draw_board_poses(board, {}, 3), 0.1, 1);
+  auto views = test::see_board(phantom::make_device({}), phantom::draw_board_poses(board(), {}, 3), 0.1, 1);
   for (auto& view : views) {
     calibration::ViewPoints front{view.name, {}, {}, {}};
     for (std::size_t i = 0; i < view.beads.size(); ++i)
-      if (board.beads[std::size_t(view.beads[i])].side == 0) {
+      if (board().beads[std::size_t(view.beads[i])].side == 0) {
         front.board_mm.push_back(view.board_mm[i]);
         front.pixels.push_back(view.pixels[i]);
       }
@@ -82,19 +79,19 @@ struct Spread {
   std::vector<double> values;
   void add(double value) { values.push_back(value); }
   double worst() const { return *std::max_element(values.begin(), values.end()); }
-  double root_mean_square() const {
-    double squares = 0;
-    for (double value : values) squares += value * value;
-    return std::sqrt(squares / double(values.size()));
-  }
-  double mean() const {
+  double mean_of(auto what) const {
     double sum = 0;
-    for (double value : values) sum += value;
+    for (const double value : values) sum += what(value);
     return sum / double(values.size());
   }
+  double root_mean_square() const {
+    return std::sqrt(mean_of([](double v) { return v * v; }));
+  }
+  double mean() const {
+    return mean_of([](double v) { return v; });
+  }
   double share_below(double limit) const {
-    return double(std::count_if(values.begin(), values.end(), [&](double v) { return v <= limit; })) /
-           double(values.size());
+    return mean_of([&](double v) { return v <= limit ? 1 : 0; });
   }
 };
 
@@ -102,8 +99,7 @@ struct Spread {
 // length 0.15 %, principal point 0.5 px, residual within 5 % of the noise). Noise bounds what a single run can reach,
 // so the worst run is compared with the error that this noise predicts.
 TEST(Calibrate, ErrorsUnderNoiseAreWhatTheNoisePredicts) {
-  const calibration::Board board = calibration::read_board_file(test::kBoardFile);
-  ASSERT_LE(board.beads.size(), 60u);
+  ASSERT_LE(board().beads.size(), 60u);
   constexpr int kSeeds = 200;
   Spread focal, principal, residual, ratio, focal_predicted, principal_predicted;
   for (int seed = 1; seed <= kSeeds; ++seed) {
@@ -112,9 +108,8 @@ TEST(Calibrate, ErrorsUnderNoiseAreWhatTheNoisePredicts) {
     std::uniform_real_distribution<double> offset(-15, 15);
     options.principal_offset_px = {offset(random), offset(random)};
     const Calibration device = phantom::make_device(options);
-    const auto poses = phantom::draw_board_poses(board, {}, std::uint64_t(seed));
-    const auto fit =
-        calibration::calibrate(test::see_board(board, device, poses, 0.2, unsigned(1000 + seed)), 1024, 1024, {});
+    const auto poses = phantom::draw_board_poses(board(), {}, std::uint64_t(seed));
+    const auto fit = calibration::calibrate(test::see_board(device, poses, 0.2, unsigned(1000 + seed)), 1024, 1024, {});
     const auto& found = fit.calibration;
     for (int i : {0, 1}) {
       focal.add(100 * std::abs(found.intrinsics(i, i) / device.intrinsics(i, i) - 1));
@@ -143,16 +138,15 @@ TEST(Calibrate, ErrorsUnderNoiseAreWhatTheNoisePredicts) {
 }
 
 TEST(Calibrate, DeviationsOfPosesAreThoseThatOccur) {
-  const calibration::Board board = calibration::read_board_file(test::kBoardFile);
   const Calibration device = phantom::make_device({});
-  const auto poses = phantom::draw_board_poses(board, {}, 11);
+  const auto poses = phantom::draw_board_poses(board(), {}, 11);
   Spread ratio;
   for (unsigned seed = 1; seed <= 60; ++seed) {
-    const auto fit = calibration::calibrate(test::see_board(board, device, poses, 0.2, seed), 1024, 1024,
+    const auto fit = calibration::calibrate(test::see_board(device, poses, 0.2, seed), 1024, 1024,
                                             {.radial_terms = 2, .square_pixels = true, .principal_point = true});
     for (std::size_t n = 0; n < poses.size(); ++n) {
       const RigidTransform& found = fit.views[n].camera_from_world;
-      const Eigen::Vector3d turn = vector_from_rotation(found.rotation * poses[n].rotation.transpose());
+      const Vector3d turn = vector_from_rotation(found.rotation * poses[n].rotation.transpose());
       for (int i = 0; i < 3; ++i) {
         ratio.add(turn[i] / fit.views[n].deviation[i]);
         ratio.add((found.translation_mm - poses[n].translation_mm)[i] / fit.views[n].deviation[3 + i]);
@@ -163,8 +157,7 @@ TEST(Calibrate, DeviationsOfPosesAreThoseThatOccur) {
 }
 
 TEST(Calibrate, SquarePixelsHaveOneFocalLengthAndOneDeviation) {
-  const calibration::Board board = calibration::read_board_file(test::kBoardFile);
-  const auto views = test::see_board(board, phantom::make_device({}), phantom::draw_board_poses(board, {}, 4), 0.2, 1);
+  const auto views = test::see_board(phantom::make_device({}), phantom::draw_board_poses(board(), {}, 4), 0.2, 1);
   const auto fit =
       calibration::calibrate(views, 1024, 1024, {.radial_terms = 1, .square_pixels = true, .principal_point = true});
   EXPECT_DOUBLE_EQ(fit.calibration.intrinsics(0, 0), fit.calibration.intrinsics(1, 1));
@@ -188,8 +181,8 @@ TEST(Calibrate, ClosedFormSolvesItsEquationsWhateverIsSeen) {
     ++found;
     double derivative = 0, squares = 0;
     for (std::size_t i = 0; i < view.board_mm.size(); ++i) {
-      const Eigen::Vector3d x = start->camera_from_world * view.board_mm[i];
-      const Eigen::Vector2d seen = view.pixels[i] - Eigen::Vector2d(511.5, 511.5);
+      const Vector3d x = start->camera_from_world * view.board_mm[i];
+      const Vector2d seen = view.pixels[i] - Vector2d(511.5, 511.5);
       derivative += x.head<2>().dot(start->focal_px * x.head<2>() - seen * x.z());
       squares += x.head<2>().squaredNorm() * start->focal_px;
     }
@@ -199,8 +192,7 @@ TEST(Calibrate, ClosedFormSolvesItsEquationsWhateverIsSeen) {
 }
 
 TEST(Calibrate, RefusesWithoutEnoughBeads) {
-  const calibration::Board board = calibration::read_board_file(test::kBoardFile);
-  auto views = test::see_board(board, phantom::make_device({}), phantom::draw_board_poses(board, {}, 3), 0, 1);
+  auto views = test::see_board(phantom::make_device({}), phantom::draw_board_poses(board(), {}, 3), 0, 1);
   views[1].board_mm.resize(5);
   views[1].pixels.resize(5);
   EXPECT_SAYS(calibration::calibrate(views, 1024, 1024, {}), "view 'view2': 5 beads are seen; at least 8 are needed");

@@ -10,6 +10,8 @@
 namespace chessboard_test {
 
 using namespace marrow;
+using namespace marrow::test;
+using Eigen::Vector3d, Eigen::Vector2d;
 using phantom::CameraArm;
 
 struct Taken {
@@ -71,9 +73,9 @@ TEST(Chessboard, CornersAreFoundInTheirOrder) {
     const auto corners = calibration::corners_mm(board);
     ASSERT_EQ(found.size(), corners.size());
     double squares = 0;
-    Eigen::Vector2d mean = Eigen::Vector2d::Zero();
+    Vector2d mean = Vector2d::Zero();
     for (std::size_t i = 0; i < corners.size(); ++i) {
-      const Eigen::Vector2d expected =
+      const Vector2d expected =
           distorted_pixel(camera.intrinsics, all.arm.device.distortion, project(camera, world_from_board * corners[i]));
       squares += (found[i] - expected).squaredNorm();
       mean += (found[i] - expected) / double(corners.size());
@@ -87,10 +89,10 @@ TEST(Chessboard, TheKnownPlaceIsWhereItsTurnsSay) {
   // Upright, seen from -y: x to the right, y down. Turned by 90 degrees about z it is seen from +x.
   const calibration::Chessboard board{3, 4, 10};
   const RigidTransform front = calibration::world_from_board(board, {{1, 2, 3}, {-90, 0, 0}});
-  EXPECT_LT((front * Eigen::Vector3d(10, 15, 0) - Eigen::Vector3d(1, 2, 3)).norm(), 1e-12);
-  EXPECT_LT((front * Eigen::Vector3d(0, 0, 0) - Eigen::Vector3d(-9, 2, 18)).norm(), 1e-12);
+  EXPECT_LT((front * Vector3d(10, 15, 0) - Vector3d(1, 2, 3)).norm(), 1e-12);
+  EXPECT_LT((front * Vector3d(0, 0, 0) - Vector3d(-9, 2, 18)).norm(), 1e-12);
   const RigidTransform side = calibration::world_from_board(board, {{0, 0, 0}, {-90, 0, 90}});
-  EXPECT_LT((side.rotation.col(2) - Eigen::Vector3d(-1, 0, 0)).norm(), 1e-12);
+  EXPECT_LT((side.rotation.col(2) - Vector3d(-1, 0, 0)).norm(), 1e-12);
 }
 
 TEST(CameraChessboard, FindsTheCameraThatPhotographedTheBoard) {
@@ -114,7 +116,7 @@ TEST(CameraChessboard, FindsTheCameraThatPhotographedTheBoard) {
     const Camera exact = phantom::camera_at(all.arm, all.arm.angles_deg[i]);
     EXPECT_LT(degrees(geodesic_angle_rad(cameras[i].camera_from_world.rotation, exact.camera_from_world.rotation)),
               0.15);
-    for (const Eigen::Vector3d& point : {Eigen::Vector3d(0, 0, 0), Eigen::Vector3d(30, 20, -80)})
+    for (const Vector3d& point : {Vector3d(0, 0, 0), Vector3d(30, 20, -80)})
       EXPECT_LT((project(cameras[i], point) - project(exact, point)).norm(), 0.5);
   }
 }
@@ -181,9 +183,8 @@ TEST(CameraPhotographs, TheLogarithmGivesTheLightWithoutDistortion) {
 TEST(CameraPhotographs, RefusesAPhotographWithoutACamera) {
   List<Picture> photographs;
   photographs.add("lateral", plain());
-  EXPECT_EQ(
-      marrow::test::message_of([&] { viewed(photographs, phantom::camera_at(taken().arm, 0), taken().arm.device); }),
-      "there is no camera for photograph 'lateral'; calibrate it with the same names");
+  EXPECT_EQ(message_of([&] { viewed(photographs, phantom::camera_at(taken().arm, 0), taken().arm.device); }),
+            "there is no camera for photograph 'lateral'; calibrate it with the same names");
 }
 
 }  // namespace chessboard_test

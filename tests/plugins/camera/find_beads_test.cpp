@@ -10,8 +10,9 @@
 
 namespace find_beads_test {
 
-using marrow::calibration::BeadImage;
-using marrow::calibration::find_beads;
+using namespace marrow;
+using calibration::BeadImage;
+using calibration::find_beads;
 
 /// An ellipse, darker than the rest by `dark`, with an edge a pixel wide.
 struct Ellipse {

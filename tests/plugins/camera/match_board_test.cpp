@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 // Which disc is which bead: with beads missing, with discs that are not beads, and with too few beads.
-#include <gtest/gtest.h>
 
 #include <algorithm>
 
@@ -11,16 +10,13 @@
 namespace match_board_test {
 
 using namespace marrow;
+using namespace marrow::test;
+using Eigen::Vector2d;
 
 struct Seen {
   std::vector<calibration::BeadImage> discs;
   std::vector<int> beads;  ///< of the disc
 };
-
-const calibration::Board& board() {
-  static const calibration::Board board = calibration::read_board_file(test::kBoardFile);
-  return board;
-}
 
 /// The discs of a view, landmarks first. Some of the other beads of each side are missing, and `others` discs are not
 /// beads.
@@ -44,14 +40,14 @@ Seen see(std::uint64_t seed, std::size_t without_lower, std::size_t without_uppe
         --left[bead.side];
         continue;
       }
-      const Eigen::Vector2d at =
-          phantom::image_of(device, pose, bead.centre_mm) + noise_px * Eigen::Vector2d(2 * part() - 1, 2 * part() - 1);
+      const Vector2d at =
+          phantom::image_of(device, pose, bead.centre_mm) + noise_px * Vector2d(2 * part() - 1, 2 * part() - 1);
       if (at.x() < 5 || at.y() < 5 || at.x() > 1018 || at.y() > 1018) continue;
       seen.discs.push_back({at, landmark ? 17.0 : 8.5, 100});
       seen.beads.push_back(int(i));
     }
   for (int i = 0; i < others; ++i) {
-    seen.discs.push_back({Eigen::Vector2d(1023 * part(), 1023 * part()), 8, 100});
+    seen.discs.push_back({Vector2d(1023 * part(), 1023 * part()), 8, 100});
     seen.beads.push_back(-1);
   }
   return seen;

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // A camera from marked points: exact without noise, as exact as its deviations say with noise, refused where the points
 // do not determine it. And the epipolar distances of camera.check, by hand.
-#include <gtest/gtest.h>
 
 #include <cmath>
 #include <random>
@@ -14,10 +13,9 @@
 namespace points_test {
 
 using namespace marrow;
-using Eigen::Vector2d;
-using Eigen::Vector3d;
-using marrow::test::put;
-using marrow::test::TemporaryFolder;
+using namespace marrow::test;
+using Eigen::Vector3d, Eigen::Vector2d, Eigen::Matrix3d;
+using CameraCheck = InAFolder;
 
 Camera a_camera() {
   CArm arm{1000, 900, {0.3, 0.3}, 1100, 700, Vector3d(5, -8, 3)};
@@ -108,7 +106,7 @@ TEST(CameraPoints, DeviationsAreThoseOfTheErrors) {
     add("predicted_centre_u_px", found.camera.intrinsics(0, 2) - truth.intrinsics(0, 2));
     add("predicted_centre_v_px", found.camera.intrinsics(1, 2) - truth.intrinsics(1, 2));
     // The motion of the camera's frame that leads from the found camera to the true one.
-    const Eigen::Matrix3d turn = truth.camera_from_world.rotation * found.camera.camera_from_world.rotation.transpose();
+    const Matrix3d turn = truth.camera_from_world.rotation * found.camera.camera_from_world.rotation.transpose();
     const Vector3d shift =
         truth.camera_from_world.translation_mm - turn * found.camera.camera_from_world.translation_mm;
     const Vector3d angle = vector_from_rotation(turn) * (180 / EIGEN_PI);
@@ -155,8 +153,7 @@ TEST(CameraPoints, WhatDoesNotDetermineACamera) {
 
 // Two cameras 90 degrees apart about the vertical axis, whose rows agree: epipolar lines of points near the centre are
 // nearly rows. A point that is marked 3 px too low in one image lies nearly 3 px from its line in both.
-TEST(CameraCheck, EpipolarDistances) {
-  const TemporaryFolder folder;
+TEST_F(CameraCheck, EpipolarDistances) {
   const CArm arm{1000, 1000, {0.3, 0.3}, 1100, 700, Vector3d::Zero()};
   List<View> views;
   for (const double beta : {0.0, 90.0}) {

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 // What a measured distortion does to points, images and masks, and between poses of the arm: hand-computed values.
-#include <gtest/gtest.h>
 
 #include <cmath>
 #include <opencv2/imgproc.hpp>
@@ -15,10 +14,12 @@
 namespace distortion_test {
 
 using namespace marrow;
-using namespace marrow::distortion;
+using namespace marrow::test;
+using Eigen::Vector2d;
+using namespace distortion;
 
 /// A field of 101 x 81 pixels, measured everywhere. Half its longer side is 50.5 px, its middle (50, 40).
-Distortion everywhere(int degree, std::vector<Eigen::Vector2d> terms) {
+Distortion everywhere(int degree, std::vector<Vector2d> terms) {
   Distortion d;
   d.width_px = 101;
   d.height_px = 81;
@@ -30,7 +31,7 @@ Distortion everywhere(int degree, std::vector<Eigen::Vector2d> terms) {
 
 /// Shift (2, -1), and u is moved by 3 x y, v by -4 y^2 + x^3.
 Distortion example() {
-  std::vector<Eigen::Vector2d> terms(terms_of(3), Eigen::Vector2d::Zero());
+  std::vector<Vector2d> terms(terms_of(3), Vector2d::Zero());
   terms[0] = {2, -1};
   terms[4] = {3, 0};
   terms[5] = {0, -4};
@@ -39,8 +40,8 @@ Distortion example() {
 }
 
 TEST(Distortion, MovesAPixelByItsTerms) {
-  const Eigen::Vector2d ideal(50 + 0.5 * 50.5, 40 - 0.2 * 50.5);
-  const Eigen::Vector2d seen = seen_pixel(example(), ideal);
+  const Vector2d ideal(50 + 0.5 * 50.5, 40 - 0.2 * 50.5);
+  const Vector2d seen = seen_pixel(example(), ideal);
   EXPECT_NEAR(seen.x() - ideal.x(), 2 + 3 * 0.5 * -0.2, 1e-12);
   EXPECT_NEAR(seen.y() - ideal.y(), -1 - 4 * 0.04 + 0.125, 1e-12);
   const auto back = ideal_pixel(example(), seen);
@@ -55,8 +56,8 @@ TEST(Distortion, ALatticeMeetsItsNodesAndIsExactForParabolas) {
     for (int column = 0; column < lattice_columns(d); ++column)
       d.lattice_px.emplace_back(0.02 * column * column, 0.03 * row * column);
   EXPECT_EQ(d.lattice_px.size(), 11u * 9u);
-  EXPECT_LT((seen_pixel(d, {30, 20}) - Eigen::Vector2d(30 + 0.18, 20 + 0.18)).norm(), 1e-12);
-  EXPECT_LT((seen_pixel(d, {45, 32}) - Eigen::Vector2d(45 + 0.02 * 4.5 * 4.5, 32 + 0.03 * 3.2 * 4.5)).norm(), 1e-12);
+  EXPECT_LT((seen_pixel(d, {30, 20}) - Vector2d(30 + 0.18, 20 + 0.18)).norm(), 1e-12);
+  EXPECT_LT((seen_pixel(d, {45, 32}) - Vector2d(45 + 0.02 * 4.5 * 4.5, 32 + 0.03 * 3.2 * 4.5)).norm(), 1e-12);
 }
 
 TEST(Distortion, OutsideOfTheAreaNothingIsMeasured) {
@@ -81,12 +82,12 @@ TEST(Distortion, SaysWhatIsWrongWithIt) {
   EXPECT_SAYS(check_distortion(d, "c.yaml"), "the distortion folds the image");
   d = example();
   d.step_px = 10;
-  d.lattice_px.resize(5, Eigen::Vector2d::Zero());
+  d.lattice_px.resize(5, Vector2d::Zero());
   EXPECT_SAYS(check_distortion(d, "c.yaml"), "the lattice has 5 nodes, but one with a step of 10 px has 99");
 }
 
 /// A view whose grey values are those of `pattern` at each pixel's ideal place.
-View bent_view(const Distortion& d, double (*pattern)(const Eigen::Vector2d&)) {
+View bent_view(const Distortion& d, double (*pattern)(const Vector2d&)) {
   View view{"v", {cv::Mat1f(d.height_px, d.width_px, 0.f)}, {}, {}};
   view.camera.width_px = d.width_px;
   view.camera.height_px = d.height_px;
@@ -98,9 +99,7 @@ View bent_view(const Distortion& d, double (*pattern)(const Eigen::Vector2d&)) {
 }
 
 TEST(Distortion, AStraightenedImageShowsThePattern) {
-  const auto pattern = [](const Eigen::Vector2d& at) {
-    return 100 + 30 * std::sin(at.x() / 9) + 20 * std::cos(at.y() / 7);
-  };
+  const auto pattern = [](const Vector2d& at) { return 100 + 30 * std::sin(at.x() / 9) + 20 * std::cos(at.y() / 7); };
   Distortion d = example();
   View view = bent_view(d, pattern);
   straighten(view, d);
@@ -115,9 +114,9 @@ TEST(Distortion, AStraightenedImageShowsThePattern) {
 TEST(Distortion, MasksAreCarriedToTheStraightImageAndBack) {
   Distortion d = example();
   d.area_px = {{5, 5}, {95, 5}, {95, 75}, {5, 75}};
-  View view = bent_view(d, [](const Eigen::Vector2d&) { return 7.0; });
+  View view = bent_view(d, [](const Vector2d&) { return 7.0; });
   view.mask = cv::Mat1b(81, 101, std::uint8_t(255));
-  const Eigen::Vector2d seen = seen_pixel(d, {30, 40});
+  const Vector2d seen = seen_pixel(d, {30, 40});
   cv::rectangle(view.mask, cv::Rect(int(seen.x()) - 2, int(seen.y()) - 2, 5, 5), cv::Scalar(0), cv::FILLED);
   straighten(view, d);
   EXPECT_EQ(view.mask.at<std::uint8_t>(40, 30), 0);
@@ -136,7 +135,7 @@ TEST(Distortion, MasksAreCarriedToTheStraightImageAndBack) {
 }
 
 TEST(Distortion, AViewOfAnotherSizeIsRefused) {
-  View view = bent_view(example(), [](const Eigen::Vector2d&) { return 1.0; });
+  View view = bent_view(example(), [](const Vector2d&) { return 1.0; });
   Distortion d = example();
   d.width_px = 102;
   EXPECT_SAYS(straighten(view, d),
@@ -149,13 +148,13 @@ PlatePoints points_of(const Distortion& d, int step) {
   points.width_px = d.width_px;
   points.height_px = d.height_px;
   for (int v = 2; v < d.height_px - 2; v += step)
-    for (int u = 2; u < d.width_px - 2; u += step) points.add(Eigen::Vector2d(u, v), seen_pixel(d, {u, v}));
+    for (int u = 2; u < d.width_px - 2; u += step) points.add(Vector2d(u, v), seen_pixel(d, {u, v}));
   return points;
 }
 
 TEST(FitDistortion, FindsItsOwnPolynomialAndTheWrongPoint) {
   PlatePoints points = points_of(example(), 5);
-  points.seen_px[70] += Eigen::Vector2d(4, 3);
+  points.seen_px[70] += Vector2d(4, 3);
   const Fit fit = fit_distortion(points, {});
   EXPECT_EQ(fit.distortion.degree, 3);
   EXPECT_LT(fit.distortion.validated_px, 1e-9);
@@ -168,7 +167,7 @@ TEST(FitDistortion, FindsItsOwnPolynomialAndTheWrongPoint) {
 TEST(FitDistortion, TheValidatedResidualSeesTooManyTerms) {
   PlatePoints points = points_of(example(), 9);  // 99 points
   Random random(3);
-  for (Eigen::Vector2d& seen : points.seen_px) seen += 0.2 * Eigen::Vector2d(random.normal(), random.normal());
+  for (Vector2d& seen : points.seen_px) seen += 0.2 * Vector2d(random.normal(), random.normal());
   FitOptions options;
   options.model = Model::polynomial;
   options.lowest_degree = options.highest_degree = 6;
@@ -180,8 +179,8 @@ TEST(FitDistortion, TheValidatedResidualSeesTooManyTerms) {
 
 TEST(FitDistortion, ALocalModelFollowsABumpThatNoPolynomialFollows) {
   PlatePoints points = points_of(example(), 3);
-  const auto bump = [](const Eigen::Vector2d& at) {
-    return Eigen::Vector2d(2 * std::exp(-(at - Eigen::Vector2d(30, 30)).squaredNorm() / 60), 0);
+  const auto bump = [](const Vector2d& at) {
+    return Vector2d(2 * std::exp(-(at - Vector2d(30, 30)).squaredNorm() / 60), 0);
   };
   for (std::size_t i = 0; i < points.used.size(); ++i) points.seen_px[i] += bump(points.ideal_px[i]);
   FitOptions options;
@@ -201,7 +200,7 @@ TEST(FitDistortion, TooFewPointsAreSaid) {
 
 TEST(ShapeOf, FindsTurnAndPincushion) {
   // Displacement c r^2 (x, y) moves outwards, c r^2 (-y, x) turns clockwise; half the side is 50.5 px.
-  std::vector<Eigen::Vector2d> terms(terms_of(3), Eigen::Vector2d::Zero());
+  std::vector<Vector2d> terms(terms_of(3), Vector2d::Zero());
   const double out = 1.5, turn = 0.4;
   terms[6] = {out, turn};
   terms[7] = {-turn, out};
@@ -216,7 +215,7 @@ TEST(ShapeOf, FindsTurnAndPincushion) {
 }
 
 ArmPose at(double first) { return ArmPose::Constant(1, first); }
-ArmPose at(double first, double second) { return Eigen::Vector2d(first, second); }
+ArmPose at(double first, double second) { return Vector2d(first, second); }
 
 TEST(SharesAt, InterpolateAndSumToOne) {
   const Eigen::VectorXd two = shares_at({at(0), at(40)}, at(10));
@@ -259,8 +258,8 @@ TEST(Mixed, AddsTermsOfDifferentDegreesAndKeepsTheCommonArea) {
   List<Distortion> both;
   both.add("a", low);
   both.add("b", high);
-  const Distortion half = mixed(both, Eigen::Vector2d(0.5, 0.5));
-  const Eigen::Vector2d pixel(30, 30);
+  const Distortion half = mixed(both, Vector2d(0.5, 0.5));
+  const Vector2d pixel(30, 30);
   EXPECT_LT((seen_pixel(half, pixel) - 0.5 * (seen_pixel(low, pixel) + seen_pixel(high, pixel))).norm(), 1e-12);
   EXPECT_TRUE(is_measured(half, {59, 40}));
   EXPECT_FALSE(is_measured(half, {61, 40}));
@@ -272,15 +271,14 @@ TEST(Mixed, RefusesWhatIsNotOfOneArm) {
   Distortion other = example();
   other.width_px = 120;
   sizes.add("b", other);
-  EXPECT_SAYS(mixed(sizes, Eigen::Vector2d(0.5, 0.5)),
-              "the distortion 'a' is of images of 101 x 81 pixels, 'b' of 120 x 81");
+  EXPECT_SAYS(mixed(sizes, Vector2d(0.5, 0.5)), "the distortion 'a' is of images of 101 x 81 pixels, 'b' of 120 x 81");
   List<Distortion> apart;
   Distortion left = example(), right = example();
   left.area_px = {{0, 0}, {20, 0}, {20, 80}, {0, 80}};
   right.area_px = {{60, 0}, {90, 0}, {90, 80}, {60, 80}};
   apart.add("a", left);
   apart.add("b", right);
-  EXPECT_SAYS(mixed(apart, Eigen::Vector2d(0.5, 0.5)), "no part of the image was measured at all poses of the arm");
+  EXPECT_SAYS(mixed(apart, Vector2d(0.5, 0.5)), "no part of the image was measured at all poses of the arm");
 }
 
 }  // namespace distortion_test

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 // A distortion's own file, the key of a camera file, and XMALab's files.
-#include <gtest/gtest.h>
 
 #include <marrow/testing/node.hpp>
 #include <opencv2/core.hpp>
@@ -12,17 +11,17 @@
 #include "marrow/toolbox/exchange/xmalab_grid.hpp"
 #include "marrow/toolbox/files/camera_file.hpp"
 #include "marrow/toolbox/files/distortion_file.hpp"
-#include "tests/plugins/read/files.hpp"
+#include "tests/plugins/read/damage.hpp"
 #include "tests/plugins/write/writing.hpp"
 
 namespace distortion_files_test {
 
 using namespace marrow;
+using namespace marrow::test;
 using distortion::Distortion, distortion::PlatePoints;
-using marrow::test::put;
-using marrow::test::TemporaryFolder;
-using marrow::test::with;
+using Eigen::Vector2d;
 using node_test::call, node_test::item;
+using DistortionFile = InAFolder;
 
 /// 64 x 48 pixels; v is moved by 2 + 0.3 x y.
 Distortion example() {
@@ -30,7 +29,7 @@ Distortion example() {
   d.width_px = 64;
   d.height_px = 48;
   d.degree = 2;
-  d.terms_px.assign(6, Eigen::Vector2d::Zero());
+  d.terms_px.assign(6, Vector2d::Zero());
   d.terms_px[0] = {0, 2};
   d.terms_px[4] = {0, 0.3};
   d.area_px = {{4, 4}, {60, 4}, {60, 44}, {4, 44}};
@@ -53,8 +52,7 @@ std::string below_key(const std::string& text) {
   return result + "\n";
 }
 
-TEST(DistortionFile, IsReadBackAsItWasWritten) {
-  const TemporaryFolder folder;
+TEST_F(DistortionFile, IsReadBackAsItWasWritten) {
   Distortion local = example();
   local.step_px = 16;
   for (int i = 0; i < distortion::lattice_columns(local) * distortion::lattice_rows(local); ++i)
@@ -63,28 +61,23 @@ TEST(DistortionFile, IsReadBackAsItWasWritten) {
     writing::write(d, folder / "d.yaml");
     EXPECT_EQ(hash_of(files::read_distortion_file(folder / "d.yaml")), hash_of(d));
   }
-  test::expect_damage_is_diagnosed(folder / "d.yaml", folder / "damaged.yaml",
-                                   [](const auto& path) { files::read_distortion_file(path); });
+  const std::string text = bytes_of(folder / "d.yaml");
+  expect_handled(folder, {"d.yaml", text, text.size(), {}, true}, files::read_distortion_file, {.as_text = true});
 }
 
-TEST(DistortionFile, SaysWhereItIsWrong) {
-  const TemporaryFolder folder;
-  const std::string good = files::distortion_text(example());
-  const auto says = [&](const std::string& text, const std::string& said) {
-    put(folder / "d.yaml", text);
-    EXPECT_SAYS(files::read_distortion_file(folder / "d.yaml"), said);
-  };
-  says(with(good, "degree: 2", "degree: 12"), "degree: expected 0 to 9, got 12");
-  says(with(good, "degree: 2", "degree: 3"), "terms_px");
-  says(with(good, "[0, 2]", "[0, .nan]"), "terms_px");
-  says(with(good, "marrow-distortion: 1\n", ""), "key 'marrow-distortion' is missing");
-  says(with(good, "marrow-distortion: 1", "marrow-distortion: 7"), "reads version 1, the file is of version 7");
-  says(with(good, "width_px: 64", "width_px: 1"), "expected 2 to 65536, got 1 and 48");
-  says(with(good, "[0, 0.3]", "[0, 4000]"), "the distortion folds the image");
+TEST_F(DistortionFile, SaysWhereItIsWrong) {
+  expect_faults(folder / "d.yaml", files::distortion_text(example()),
+                {{"degree: 2", "degree: 12", "degree: expected 0 to 9, got 12"},
+                 {"degree: 2", "degree: 3", "terms_px"},
+                 {"[0, 2]", "[0, .nan]", "terms_px"},
+                 {"marrow-distortion: 1\n", "", "key 'marrow-distortion' is missing"},
+                 {"marrow-distortion: 1", "marrow-distortion: 7", "reads version 1, the file is of version 7"},
+                 {"width_px: 64", "width_px: 1", "expected 2 to 65536, got 1 and 48"},
+                 {"[0, 0.3]", "[0, 4000]", "the distortion folds the image"}},
+                files::read_distortion_file);
 }
 
-TEST(DistortionFile, ACameraFileHoldsOne) {
-  const TemporaryFolder folder;
+TEST_F(DistortionFile, ACameraFileHoldsOne) {
   const std::string key = below_key(files::distortion_text(example()));
   put(folder / "c.yaml", kCamera + key);
   const files::CameraInFile camera = files::read_camera_file(folder / "c.yaml");
@@ -111,8 +104,7 @@ void expect_straight(const View& view) {
   EXPECT_EQ(view.camera.intrinsics(0, 2), 31.5);
 }
 
-TEST(DistortionFile, AViewIsStraightenedWhenItIsRead) {
-  const TemporaryFolder folder;
+TEST_F(DistortionFile, AViewIsStraightenedWhenItIsRead) {
   writing::write(Image{ramp()}, folder / "v.png");
   put(folder / "c.yaml", kCamera);
   writing::write(example(), folder / "d.yaml");
@@ -136,9 +128,8 @@ PlatePoints grid_points() {
   points.height_px = 480;
   for (int v = 20; v < 470; v += 25)
     for (int u = 20; u < 630; u += 25) {
-      const Eigen::Vector2d ideal(u, v), off = (ideal - Eigen::Vector2d(319.5, 239.5)) / 320;
-      points.add(ideal,
-                 ideal + 9 * off.squaredNorm() * off + 2 * off.squaredNorm() * Eigen::Vector2d(-off.y(), off.x()));
+      const Vector2d ideal(u, v), off = (ideal - Vector2d(319.5, 239.5)) / 320;
+      points.add(ideal, ideal + 9 * off.squaredNorm() * off + 2 * off.squaredNorm() * Vector2d(-off.y(), off.x()));
     }
   points.used[7] = 0;
   return points;
@@ -203,10 +194,10 @@ TEST(XmalabGrid, ParametersComeAfterTheGrid) {
   options.erase("references");
   options.erase("inlier");
   const auto alone = call("read.xmalab_grid", {}, options).at("points").as<PlatePoints>();
-  const auto bent = [&](const Eigen::Vector2d& ideal) {
+  const auto bent = [&](const Vector2d& ideal) {
     const double x = (ideal.x() - 320) / 1000, y = (ideal.y() - 240) / 1000, r2 = x * x + y * y;
-    return Eigen::Vector2d(320 + 1000 * (x * (1 + k1 * r2) + 2 * p1 * x * y + p2 * (r2 + 2 * x * x)),
-                           240 + 1000 * (y * (1 + k1 * r2) + p1 * (r2 + 2 * y * y) + 2 * p2 * x * y));
+    return Vector2d(320 + 1000 * (x * (1 + k1 * r2) + 2 * p1 * x * y + p2 * (r2 + 2 * x * x)),
+                    240 + 1000 * (y * (1 + k1 * r2) + p1 * (r2 + 2 * y * y) + 2 * p2 * x * y));
   };
   ASSERT_EQ(with_grid.used.size(), grid_points().used.size());
   for (std::size_t i = 0; i < with_grid.used.size(); ++i) {

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 // From simulated images of plates to the distortion. The truth is no polynomial, and its points are no dots.
-#include <gtest/gtest.h>
 
 #include <marrow/testing/node.hpp>
 
@@ -11,7 +10,9 @@
 namespace plate_test {
 
 using namespace marrow;
+using namespace marrow::test;
 using distortion::Distortion, distortion::PlatePoints;
+using Eigen::Vector2d;
 using node_test::call, node_test::item, node_test::list;
 
 struct Simulated {
@@ -105,7 +106,7 @@ TEST(DistortionPlates, AMirroredImageHasTheMirroredDistortion) {
   EXPECT_NEAR(figure(one.at("metrics"), "pincushion"), figure(other.at("metrics"), "pincushion"), 0.05);
   PlatePoints truth = device.truth[0];
   for (auto* places : {&truth.ideal_px, &truth.seen_px})
-    for (Eigen::Vector2d& place : *places) place.x() = 511 - place.x();
+    for (Vector2d& place : *places) place.x() = 511 - place.x();
   EXPECT_LT(errors_of(other.at("distortion"), truth).usual_px, 0.05);
 }
 
@@ -171,14 +172,14 @@ TEST(DistortionPlates, RefuseAnImageWithoutAPlate) {
 
 /// The indices of a 12 x 9 grid, turned by 20 degrees, of which some dots are missing.
 TEST(FindGrid, IndexesAKnownGrid) {
-  using namespace marrow::distortion;
+  using namespace distortion;
   for (const Pattern pattern : {Pattern::square, Pattern::hexagonal}) {
     std::vector<Spot> spots;
     std::vector<std::pair<int, int>> known;
     for (int row = 0; row < 9; ++row)
       for (int column = 0; column < 12; ++column) {
         if (row == 4 && column % 5 == 2) continue;
-        const Eigen::Vector2d at = 17 * place_on_plate(pattern, column, row);
+        const Vector2d at = 17 * place_on_plate(pattern, column, row);
         spots.push_back({{60 + std::cos(0.35) * at.x() - std::sin(0.35) * at.y(),
                           200 + std::sin(0.35) * at.x() + std::cos(0.35) * at.y()},
                          100});

@@ -2,8 +2,6 @@
 // The distortion of an image is removed once, when its view is read.
 #include "marrow/read/calibration_file.hpp"
 
-#include <gtest/gtest.h>
-
 #include <opencv2/core.hpp>
 
 #include "tests/plugins/read/files.hpp"
@@ -12,18 +10,14 @@
 
 namespace calibration_test {
 
-using marrow::Calibration;
-using marrow::Camera;
-using marrow::RadialDistortion;
-using marrow::test::put;
-using marrow::test::TemporaryFolder;
-using marrow::test::view_from;
-using marrow::test::with;
+using namespace marrow;
+using namespace marrow::test;
+using Eigen::Vector2d, Eigen::Matrix3d;
 
 constexpr int kWidth = 200, kHeight = 160;
 
-Eigen::Matrix3d intrinsics() {
-  Eigen::Matrix3d k;
+Matrix3d intrinsics() {
+  Matrix3d k;
   k << 650, 0, 104, 0, 640, 77, 0, 0, 1;
   return k;
 }
@@ -31,7 +25,7 @@ Eigen::Matrix3d intrinsics() {
 const RadialDistortion kPincushion{{3, 10, 0}};
 
 /// Grey values that vary smoothly over the undistorted image.
-double pattern(const Eigen::Vector2d& pixel) {
+double pattern(const Vector2d& pixel) {
   return 128 + 50 * std::sin(0.11 * pixel.x()) + 50 * std::cos(0.13 * pixel.y());
 }
 
@@ -41,40 +35,47 @@ cv::Mat1f as_taken() {
   cv::Mat1f image(kHeight, kWidth);
   for (int v = 0; v < kHeight; ++v)
     for (int u = 0; u < kWidth; ++u) {
-      const Eigen::Vector2d seen(u, v);
-      Eigen::Vector2d ideal = seen;
+      const Vector2d seen(u, v);
+      Vector2d ideal = seen;
       for (int i = 0; i < 60; ++i) ideal += seen - distorted_pixel(intrinsics(), kPincushion, ideal);
       image(v, u) = float(pattern(ideal));
     }
   return image;
 }
 
-std::string camera_text() {
-  return "marrow-camera: 1\nwidth_px: 200\nheight_px: 160\nintrinsics: [[650, 0, 104], [0, 640, 77], [0, 0, 1]]\n"
-         "radial_distortion: [3, 10, 0]\ncamera_from_world:\n  target: camera\n  source: world\n"
-         "  rotation: [[1, 0, 0], [0, 1, 0], [0, 0, 1]]\n  translation_mm: [1, 2, 900]\n";
+const std::string kCamera =
+    "width_px: 200\nheight_px: 160\nintrinsics: [[650, 0, 104], [0, 640, 77], [0, 0, 1]]\n"
+    "radial_distortion: [3, 10, 0]\n";
+const std::string kPlace =
+    "camera_from_world:\n  target: camera\n  source: world\n  rotation: [[1, 0, 0], [0, 1, 0], [0, 0, 1]]\n"
+    "  translation_mm: [1, 2, 900]\n";
+
+class ReadCalibration : public InAFolder {
+ protected:
+  ReadCalibration() {
+    const cv::Mat1f image = as_taken();
+    ItkGrid<float> grid{.size = {kWidth, kHeight}};
+    grid.samples.assign(image.begin(), image.end());
+    write_itk(folder / "a.tif", grid);
+    put(folder / "a.yaml", "marrow-camera: 1\n" + kCamera + kPlace);
+    put(folder / "plain.yaml", "marrow-camera: 1\n" + with(kCamera, "radial_distortion: [3, 10, 0]\n", "") + kPlace);
+    put(folder / "c.yaml", "marrow-calibration: 1\n" + kCamera);
+  }
+};
+
+/// Whether a place of the straight image was seen.
+bool is_inside(const Vector2d& seen) {
+  return seen.x() >= 0 && seen.y() >= 0 && seen.x() <= kWidth - 1 && seen.y() <= kHeight - 1;
 }
 
-std::string calibration_text() {
-  return "marrow-calibration: 1\nwidth_px: 200\nheight_px: 160\nintrinsics: [[650, 0, 104], [0, 640, 77], [0, 0, 1]]\n"
-         "radial_distortion: [3, 10, 0]\n";
-}
-
-void write_image(const std::filesystem::path& path) {
-  const cv::Mat1f image = as_taken();
-  marrow::test::ItkGrid<float> grid{.size = {kWidth, kHeight}};
-  grid.samples.assign(image.begin(), image.end());
-  write_itk(path, grid);
-}
-
-void expect_straight(const marrow::View& view) {
+void expect_straight(const View& view) {
   ASSERT_EQ(view.mask.size(), cv::Size(kWidth, kHeight)) << "the corners of the image as taken lie inside";
   int used = 0;
   double worst = 0;
   for (int v = 0; v < kHeight; ++v)
     for (int u = 0; u < kWidth; ++u) {
-      const Eigen::Vector2d seen = distorted_pixel(intrinsics(), kPincushion, {u, v});
-      const bool inside = seen.x() >= 0 && seen.y() >= 0 && seen.x() <= kWidth - 1 && seen.y() <= kHeight - 1;
+      const Vector2d seen = distorted_pixel(intrinsics(), kPincushion, {u, v});
+      const bool inside = is_inside(seen);
       ASSERT_EQ(view.mask.at<std::uint8_t>(v, u) != 0, inside) << u << " " << v;
       if (!inside || seen.x() < 2 || seen.y() < 2 || seen.x() > kWidth - 3 || seen.y() > kHeight - 3) continue;
       worst = std::max(worst, std::abs(view.image.pixels.at<float>(v, u) - pattern({u, v})));
@@ -86,42 +87,49 @@ void expect_straight(const marrow::View& view) {
 }
 
 TEST(Calibration, ForwardModelByHand) {
-  const Eigen::Vector2d seen = distorted_pixel(intrinsics(), kPincushion, {104 + 65, 77});
+  const Vector2d seen = distorted_pixel(intrinsics(), kPincushion, {104 + 65, 77});
   const double r2 = 0.01, factor = 1 + 3 * r2 + 10 * r2 * r2;
   EXPECT_NEAR(seen.x(), 104 + 65 * factor, 1e-9);
   EXPECT_NEAR(seen.y(), 77, 1e-9);
 }
 
-TEST(Calibration, CameraFileWithDistortion) {
-  const TemporaryFolder folder;
-  write_image(folder / "a.tif");
-  put(folder / "a.yaml", camera_text());
-  const marrow::View read = view_from(nullptr, {"a", folder / "a.tif", folder / "a.yaml"});
+TEST_F(ReadCalibration, CameraFileWithDistortion) {
+  const View read = view_from(nullptr, {"a", folder / "a.tif", folder / "a.yaml"});
   expect_straight(read);
   EXPECT_EQ(read.camera.camera_from_world.translation_mm.z(), 900);
 }
 
-TEST(Calibration, CalibrationOfTheDeviceReplacesTheCameraMatrix) {
-  const TemporaryFolder folder;
-  write_image(folder / "a.tif");
-  put(folder / "c.yaml", calibration_text());
-  Camera nominal{kWidth, kHeight, Eigen::Matrix3d::Identity(), {}};
+TEST_F(ReadCalibration, CalibrationOfTheDeviceReplacesTheCameraMatrix) {
+  Camera nominal{kWidth, kHeight, Matrix3d::Identity(), {}};
   nominal.intrinsics << 600, 0, 99.5, 0, 600, 79.5, 0, 0, 1;
-  nominal.camera_from_world = {"camera", "world", Eigen::Matrix3d::Identity(), {0, 0, 600}};
-  const marrow::View read = view_from(&nominal, {"a", folder / "a.tif", {}, folder / "c.yaml"});
+  nominal.camera_from_world = {"camera", "world", Matrix3d::Identity(), {0, 0, 600}};
+  const View read = view_from(&nominal, {"a", folder / "a.tif", {}, folder / "c.yaml"});
   expect_straight(read);
   EXPECT_EQ(read.camera.camera_from_world.translation_mm.z(), 600);
 }
 
+TEST_F(ReadCalibration, Refusals) {
+  const auto read = [&](const std::string& camera, const std::string& calibration) {
+    put(folder / "c.yaml", "marrow-calibration: 1\n" + calibration);
+    return view_from(nullptr, {"a", folder / "a.tif", folder / camera, folder / "c.yaml"});
+  };
+  EXPECT_SAYS(read("a.yaml", kCamera), "which can be removed only once");
+  EXPECT_SAYS(read("plain.yaml", with(kCamera, "width_px: 200", "width_px: 300")),
+              "the image has 200 x 160 pixels, but the calibration is of images of 300 x 160");
+  EXPECT_SAYS(read("plain.yaml", with(kCamera, "[3, 10, 0]", "[-30, 0, 0]")), "the radial distortion folds the image");
+  EXPECT_SAYS(read("plain.yaml", with(kCamera, "[3, 10, 0]", "[3, 10]")),
+              "c.yaml:5:20: calibration: radial_distortion: expected 3 numbers");
+}
+
 TEST(Calibration, OwnMaskIsMovedAlong) {
-  marrow::View read;
+  View read;
   read.name = "a";
   read.image.pixels = as_taken();
-  read.camera = {kWidth, kHeight, intrinsics(), {"camera", "world", Eigen::Matrix3d::Identity(), {0, 0, 600}}};
+  read.camera = {kWidth, kHeight, intrinsics(), {"camera", "world", Matrix3d::Identity(), {0, 0, 600}}};
   read.mask = cv::Mat1b(kHeight, kWidth, std::uint8_t(255));
-  const Eigen::Vector2d hidden = distorted_pixel(intrinsics(), kPincushion, {150, 40});
+  const Vector2d hidden = distorted_pixel(intrinsics(), kPincushion, {150, 40});
   read.mask(cv::Rect(int(hidden.x()) - 2, int(hidden.y()) - 2, 6, 6)) = 0;
-  marrow::remove_distortion(read, kPincushion);
+  remove_distortion(read, kPincushion);
   EXPECT_EQ(read.mask.at<std::uint8_t>(40, 150), 0);
   EXPECT_EQ(read.mask.at<std::uint8_t>(77, 104), 255);
 }
@@ -139,23 +147,23 @@ cv::Mat1b drawn() {
 TEST(Calibration, MaskDrawnOnTheStraightImageComesBack) {
   for (const RadialDistortion& distortion : {kPincushion, RadialDistortion{{-3.5, 2, 0}}}) {
     const cv::Mat1b mask = drawn();
-    const cv::Mat1b original = marrow::original_mask(mask, intrinsics(), distortion);
-    const cv::Mat1b again = marrow::straightened_mask(original, intrinsics(), distortion);
+    const cv::Mat1b original = original_mask(mask, intrinsics(), distortion);
+    const cv::Mat1b again = straightened_mask(original, intrinsics(), distortion);
     int moved = 0;
     for (int v = 0; v < kHeight; ++v)
       for (int u = 0; u < kWidth; ++u) {
-        const Eigen::Vector2d seen = distorted_pixel(intrinsics(), distortion, {u, v});
-        const bool inside = seen.x() >= 0 && seen.y() >= 0 && seen.x() <= kWidth - 1 && seen.y() <= kHeight - 1;
+        const Vector2d seen = distorted_pixel(intrinsics(), distortion, {u, v});
+        const bool inside = is_inside(seen);
         if (!inside || mask(v, u) == 0) {
           EXPECT_EQ(again(v, u), 0) << "what was drawn is zero: " << u << " " << v;
         } else if (again(v, u) == 0) {
           const cv::Rect around = cv::Rect(u - 2, v - 2, 5, 5) & cv::Rect(0, 0, kWidth, kHeight);
           EXPECT_LT(cv::countNonZero(mask(around)), around.area()) << "far from what was drawn: " << u << " " << v;
         }
-        moved += seen.x() > 0 && (seen - Eigen::Vector2d(u, v)).norm() > 3;
+        moved += seen.x() > 0 && (seen - Vector2d(u, v)).norm() > 3;
       }
     EXPECT_GT(moved, kWidth * kHeight / 10) << "the distortion is strong";
-    EXPECT_EQ(cv::norm(marrow::original_mask(again, intrinsics(), distortion), original, cv::NORM_INF), 0)
+    EXPECT_EQ(cv::norm(original_mask(again, intrinsics(), distortion), original, cv::NORM_INF), 0)
         << "reading and writing it again changes nothing";
   }
 }
@@ -166,44 +174,25 @@ TEST(Calibration, MaskOfTheOriginalImageHasNoHoles) {
     mask(cv::Rect(110, 20, 70, 100)) = 0;
     return mask;
   }();
-  const cv::Mat1b original = marrow::original_mask(box, intrinsics(), kPincushion);
+  const cv::Mat1b original = original_mask(box, intrinsics(), kPincushion);
   for (int v = 0; v < kHeight; ++v) {  // a row crosses the box once
     int changes = 0;
     for (int u = 1; u < kWidth; ++u) changes += original(v, u) != original(v, u - 1);
     EXPECT_LE(changes, 2) << v;
   }
-  EXPECT_SAYS(marrow::original_mask(box, intrinsics(), RadialDistortion{{-60, 0, 0}}),
+  EXPECT_SAYS(original_mask(box, intrinsics(), RadialDistortion{{-60, 0, 0}}),
               "the mask: the radial distortion folds the image");
 }
 
 TEST(Calibration, WithoutDistortionNothingChanges) {
-  marrow::View read;
+  View read;
   read.name = "a";
   const cv::Mat1f image = as_taken();
   read.image.pixels = image;
-  read.camera = {kWidth, kHeight, intrinsics(), {"camera", "world", Eigen::Matrix3d::Identity(), {0, 0, 600}}};
-  marrow::remove_distortion(read, {});
+  read.camera = {kWidth, kHeight, intrinsics(), {"camera", "world", Matrix3d::Identity(), {0, 0, 600}}};
+  remove_distortion(read, {});
   EXPECT_LT(cv::norm(read.image.pixels, image, cv::NORM_INF), 1e-3);
   EXPECT_TRUE(read.mask.empty());
-}
-
-TEST(Calibration, Refusals) {
-  const TemporaryFolder folder;
-  write_image(folder / "a.tif");
-  put(folder / "a.yaml", camera_text());
-  put(folder / "c.yaml", calibration_text());
-  EXPECT_SAYS(view_from(nullptr, {"a", folder / "a.tif", folder / "a.yaml", folder / "c.yaml"}),
-              "which can be removed only once");
-  put(folder / "c.yaml", with(calibration_text(), "width_px: 200", "width_px: 300"));
-  put(folder / "plain.yaml", with(camera_text(), "radial_distortion: [3, 10, 0]\n", ""));
-  EXPECT_SAYS(view_from(nullptr, {"a", folder / "a.tif", folder / "plain.yaml", folder / "c.yaml"}),
-              "the image has 200 x 160 pixels, but the calibration is of images of 300 x 160");
-  put(folder / "c.yaml", with(calibration_text(), "[3, 10, 0]", "[-30, 0, 0]"));
-  EXPECT_SAYS(view_from(nullptr, {"a", folder / "a.tif", folder / "plain.yaml", folder / "c.yaml"}),
-              "the radial distortion folds the image");
-  put(folder / "c.yaml", with(calibration_text(), "[3, 10, 0]", "[3, 10]"));
-  EXPECT_SAYS(marrow::read::read_calibration_file(folder / "c.yaml"),
-              "c.yaml:5:20: calibration: radial_distortion: expected 3 numbers");
 }
 
 }  // namespace calibration_test

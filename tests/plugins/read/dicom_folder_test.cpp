@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 // What lies beside the slices of a CT: other DICOM objects, and files of other kinds.
-#include <gtest/gtest.h>
 #include <zlib.h>
 
 #include "tests/plugins/read/dicom_text.hpp"
@@ -9,6 +8,7 @@
 
 namespace dicom_folder_test {
 
+using namespace marrow;
 using namespace marrow::test;
 
 constexpr const char* kCtClass = "1.2.840.10008.5.1.4.1.1.2";
@@ -17,27 +17,17 @@ constexpr const char* kOtherSeries = "UI:1.2.77";
 /// All elements after the start packed by Deflate, without a header (PS3.5 A.5).
 std::string deflated_file(const Elements& elements) {
   const std::string plain = dicom_elements(elements);
-  std::string packed(plain.size() + 100, '\0');
-  z_stream packer{};
-  deflateInit2(&packer, 9, Z_DEFLATED, -15, 9, Z_DEFAULT_STRATEGY);
-  packer.next_in = reinterpret_cast<unsigned char*>(const_cast<char*>(plain.data()));
-  packer.avail_in = unsigned(plain.size());
-  packer.next_out = reinterpret_cast<unsigned char*>(packed.data());
-  packer.avail_out = unsigned(packed.size());
-  EXPECT_EQ(deflate(&packer, Z_FINISH), Z_STREAM_END);
-  packed.resize(packer.total_out);
-  deflateEnd(&packer);
-  return dicom_start("1.2.840.10008.1.2.1.99", kCtClass) + packed;
-}
-
-Elements changed(Elements elements, const Elements& by) {
-  for (const auto& [tag, value] : by) elements[tag] = value;
-  return elements;
+  std::string packed(compressBound(plain.size()), '\0');
+  uLongf length = packed.size();
+  EXPECT_EQ(compress(reinterpret_cast<Bytef*>(packed.data()), &length, reinterpret_cast<const Bytef*>(plain.data()),
+                     plain.size()),
+            Z_OK);
+  return dicom_start("1.2.840.10008.1.2.1.99", kCtClass) + packed.substr(2, length - 6);
 }
 
 /// A slice of another CT series.
 Elements other_slice(const Elements& by = {}) {
-  return changed(changed(ct_slice(0), {{0x00080016, std::string("UI:") + kCtClass}, {0x0020000E, kOtherSeries}}), by);
+  return but(but(ct_slice(0), {{0x00080016, std::string("UI:") + kCtClass}, {0x0020000E, kOtherSeries}}), by);
 }
 
 /// A report, plan or the like.
@@ -45,28 +35,28 @@ Elements other_object(const std::string& class_uid, const std::string& modality)
   return {{0x00080016, "UI:" + class_uid}, {0x00080060, "CS:" + modality}, {0x0020000E, kOtherSeries}};
 }
 
-class DicomFolder : public testing::Test {
+class DicomFolder : public InAFolder {
  protected:
   void SetUp() override {
     for (int z = 0; z < 3; ++z) put_file("s" + std::to_string(z), dicom_file(ct_slice(z)));
   }
   void put_file(const std::string& name, const std::string& bytes) { put(folder / name, bytes); }
-  marrow::Volume read(const std::string& series_uid = "") {
-    lines.clear();
-    marrow::Context::Hooks hooks;
-    hooks.log = [&](std::string_view text, marrow::LogLevel) { lines.emplace_back(text); };
-    return read_by<marrow::Volume>("read.volume", folder.path(), {{"series_uid", series_uid}}, marrow::Context(hooks));
+  Volume read(const std::string& series_uid = "") {
+    Volume volume;
+    lines = said_by([&](const Context& context) {
+      volume = read_by<Volume>("read.volume", folder.path(), {{"series_uid", series_uid}}, context);
+    });
+    return volume;
   }
   /// The volume consists of the three slices alone, and one line of the log says what was left out.
   void expect_passed_over(const std::string& said, const std::string& series_uid = "") {
-    marrow::Volume volume;
+    Volume volume;
     ASSERT_EQ(message_of([&] { volume = read(series_uid); }), "") << said;
     ASSERT_EQ(volume.grid.size, (std::array<int, 3>{4, 3, 3}));
     EXPECT_EQ(volume.at(3, 2, 1), 11 - 1024);
     ASSERT_EQ(lines.size(), 1u) << said;
     EXPECT_EQ(lines[0], "passed over what is no slice of the series: " + said);
   }
-  TemporaryFolder folder;
   std::vector<std::string> lines;
 };
 
@@ -95,20 +85,18 @@ TEST_F(DicomFolder, ObjectsThatAreNoSliceOfACtArePassedOver) {
       mr{{0x00080016, "UI:" + storage + "4"}, {0x00080060, "CS:MR"}},
       localizer{{0x00080008, "CS:ORIGINAL\\PRIMARY\\LOCALIZER"}},
       page{{0x00080016, "UI:" + storage + "7"}, {0x00280010, "US:3"}};
-  Elements unplaced = other_slice(page);
-  unplaced.erase(0x00200032);
   const std::pair<std::string, std::string> objects[] = {
       {dicom_start("1.2.840.10008.1.2.1", "1.2.840.10008.1.3.10"), "a media directory"},
       {dicom_file(other_object(storage + "88.33", "SR")), "SR"},
       {dicom_file(other_object(storage + "481.5", "RTPLAN")), "RTPLAN"},
       {implicit_file(other_object(storage + "481.2", "RTDOSE")), "RTDOSE"},
-      {implicit_elements(changed(other_object(storage + "481.3", "RTSTRUCT"), {{0x00080005, "CS:ISO_IR 100"}})),
+      {implicit_elements(but(other_object(storage + "481.3", "RTSTRUCT"), {{0x00080005, "CS:ISO_IR 100"}})),
        "RTSTRUCT"},
       {dicom_file(other_object(storage + "66.4", "SEG")), "SEG"},
       {dicom_file(other_slice(colours)), "in colours"},
       {dicom_file(other_slice(mr)), "MR"},
       {dicom_file(other_slice(localizer)), "a localizer"},
-      {dicom_file(unplaced), "without a place in the patient"},
+      {dicom_file(without(other_slice(page), {0x00200032})), "without a place in the patient"},
       {dicom_start("1.2.840.10008.1.2.4.90") + dicom_elements(other_slice(mr)), "MR"}};
   for (const auto& [bytes, why] : objects)
     for (const char* name : {"other.dcm", "IM77"})
@@ -148,8 +136,8 @@ TEST_F(DicomFolder, AFileWhoseSeriesCannotBeToldIsRefused) {
 // A byte of the class or modality of a slice may be damaged.
 TEST_F(DicomFolder, ASliceIsNotPassedOverForOneWrongElement) {
   const Elements classed{{0x00080016, std::string("UI:") + kCtClass}};
-  for (int z = 0; z < 3; ++z) put_file("s" + std::to_string(z), dicom_file(changed(ct_slice(z), classed)));
-  const auto last = [&](const Elements& by) { put_file("s2", dicom_file(changed(changed(ct_slice(2), classed), by))); };
+  for (int z = 0; z < 3; ++z) put_file("s" + std::to_string(z), dicom_file(but(ct_slice(z), classed)));
+  const auto last = [&](const Elements& by) { put_file("s2", dicom_file(but(but(ct_slice(2), classed), by))); };
   last({{0x00080016, "UI:1.2.840.10008.5.1.4.1.1.4"}});
   EXPECT_EQ(read().grid.size[2], 3);
   last({{0x00080060, "CS:CU"}});
@@ -159,9 +147,9 @@ TEST_F(DicomFolder, ASliceIsNotPassedOverForOneWrongElement) {
 }
 
 TEST_F(DicomFolder, ADataSetWithoutAFilesStartIsRead) {
-  put_file("s1", implicit_elements(changed(ct_slice(1), {{0x00080005, "CS:ISO_IR 100"}})));
-  put_file("s2", dicom_elements(changed(ct_slice(2), {{0x00080005, "CS:ISO_IR 100"}})));
-  const marrow::Volume volume = read();
+  put_file("s1", implicit_elements(but(ct_slice(1), {{0x00080005, "CS:ISO_IR 100"}})));
+  put_file("s2", dicom_elements(but(ct_slice(2), {{0x00080005, "CS:ISO_IR 100"}})));
+  const Volume volume = read();
   for (int z = 0; z < 3; ++z) EXPECT_EQ(volume.at(3, 2, z), 11 - 1024);
   EXPECT_TRUE(lines.empty());
 }
@@ -204,11 +192,11 @@ TEST_F(DicomFolder, SlicesBelowAreNamedAllAtOnceAndOtherObjectsArePassedOver) {
 
 TEST(DicomFolderWithoutACt, SaysWhatIsThere) {
   const TemporaryFolder folder;
-  const auto read = [&] { read_by<marrow::Volume>("read.volume", folder.path()); };
+  const auto read = [&] { read_by<Volume>("read.volume", folder.path()); };
   put(folder / "a", dicom_file(other_object("1.2.840.10008.5.1.4.1.1.88.33", "SR")));
   EXPECT_SAYS(read(), "a: holds no image, it is of modality SR; expected a CT slice or an X-ray image");
   put(folder / "b",
-      dicom_file(changed(other_object("1.2.840.10008.5.1.4.1.1.481.5", "RTPLAN"), {{0x0020000E, "UI:1.2.78"}})));
+      dicom_file(but(other_object("1.2.840.10008.5.1.4.1.1.481.5", "RTPLAN"), {{0x0020000E, "UI:1.2.78"}})));
   EXPECT_SAYS(read(), "holds no slice of a CT; its DICOM files are of these series:\n    1.2.77 (SR, 1 ");
 }
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Temporary folders, damaged copies and messages for tests of readers and writers.
+// Temporary folders, parts of files, and messages for tests of readers and writers.
 #include <gtest/gtest.h>
 #include <unistd.h>
 
@@ -33,6 +33,12 @@ class TemporaryFolder {
   std::filesystem::path path_;
 };
 
+/// A test with a folder of its own.
+class InAFolder : public testing::Test {
+ protected:
+  TemporaryFolder folder;
+};
+
 inline std::string bytes_of(const std::filesystem::path& path) {
   std::ifstream stream(path, std::ios::binary);
   return {std::istreambuf_iterator<char>(stream), {}};
@@ -48,21 +54,11 @@ template <class T>
 std::string number(T value) {
   return {reinterpret_cast<const char*>(&value), sizeof value};
 }
-
-/// A field of a TIFF's directory.
-inline std::string tiff_entry(int tag, int type, std::uint32_t count, std::uint32_t value) {
-  return number(std::uint16_t(tag)) + number(std::uint16_t(type)) + number(count) + number(value);
-}
+inline std::string little(std::uint64_t value, int width) { return number(value).substr(0, std::size_t(width)); }
 
 /// Other bytes from a place on.
 inline std::string replaced(std::string bytes, std::size_t at, const std::string& by) {
   return bytes.replace(at, by.size(), by);
-}
-
-/// `text` without a folder's name, which may hold any letters.
-inline std::string without_folder(std::string text, const std::filesystem::path& folder) {
-  for (std::size_t at; (at = text.find(folder.string())) != std::string::npos;) text.erase(at, folder.string().size());
-  return text;
 }
 
 /// `text` with the first `from` replaced.
@@ -70,6 +66,18 @@ inline std::string with(std::string text, const std::string& from, const std::st
   const std::size_t at = text.find(from);
   EXPECT_NE(at, std::string::npos) << from;
   return at == std::string::npos ? text : text.replace(at, from.size(), to);
+}
+
+/// `text` with every `from` replaced.
+inline std::string with_each(std::string text, const std::string& from, const std::string& to) {
+  for (std::size_t at = 0; (at = text.find(from, at)) != std::string::npos; at += to.size())
+    text.replace(at, from.size(), to);
+  return text;
+}
+
+/// `text` without a folder's name, which may hold any letters.
+inline std::string without_folder(const std::string& text, const std::filesystem::path& folder) {
+  return with_each(text, folder.string(), "");
 }
 
 #define EXPECT_SAYS(call, text)                                                           \
@@ -88,30 +96,5 @@ inline std::filesystem::path real_data(const std::string& name) {
 #define MARROW_NEED_DATA(variable, name)                                  \
   const std::filesystem::path variable = ::marrow::test::real_data(name); \
   if (variable.empty()) GTEST_SKIP() << "the real data '" << (name) << "' are not on this machine"
-
-/// Reading each of these damaged copies throws Error that names the file: cut off at several places, empty, text,
-/// zeros.
-template <class Read>
-void expect_damage_is_diagnosed(const std::filesystem::path& good, const std::filesystem::path& damaged, Read read) {
-  const std::string bytes = bytes_of(good);
-  ASSERT_GT(bytes.size(), 64u);
-  const auto expect_named = [&](const std::string& content, const std::string& how) {
-    put(damaged, content);
-    const std::string said = message_of([&] { read(damaged); });
-    EXPECT_NE(said.find(damaged.filename().string()), std::string::npos)
-        << how << ": " << (said.empty() ? "(nothing thrown)" : said);
-    EXPECT_EQ(without_folder(said, damaged.parent_path()).find("0x"), std::string::npos) << how << ": " << said;
-  };
-  for (const double part : {0.01, 0.1, 0.5, 0.9, 0.99})
-    expect_named(bytes.substr(0, std::size_t(double(bytes.size()) * part)), "cut off at " + std::to_string(part));
-  expect_named("", "empty");
-  expect_named("this is a text, not what the name says\n", "text");
-  expect_named(std::string(4096, '\0'), "zeros");
-  expect_named(bytes.substr(bytes.size() / 2), "the second half alone");
-  std::string noisy = bytes;
-  for (std::size_t i = 0; i < std::min<std::size_t>(noisy.size(), 200); ++i)
-    noisy[i] = char(noisy[i] ^ char(i * 37 + 11));
-  expect_named(noisy, "its first 200 bytes scrambled");
-}
 
 }  // namespace marrow::test

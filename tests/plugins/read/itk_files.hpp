@@ -7,6 +7,8 @@
 #include <string>
 #include <vector>
 
+#include "tests/plugins/read/files.hpp"
+
 namespace marrow::test {
 
 /// A grid of samples for write_itk(). axes[k]: direction of grid axis k.
@@ -19,9 +21,31 @@ struct ItkGrid {
   std::vector<std::vector<double>> axes{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
 };
 
+/// Samples 0, step, 2 step, ...; with step 0 all are `first`.
+template <class T>
+ItkGrid<T> ramp(const std::vector<unsigned>& size, double step, double first = 0) {
+  ItkGrid<T> grid{.size = size};
+  std::size_t count = 1;
+  for (const unsigned length : size) count *= length;
+  for (std::size_t i = 0; i < count; ++i) grid.samples.push_back(T(first + double(i) * step));
+  return grid;
+}
+template <class T>
+ItkGrid<T> filled(const std::vector<unsigned>& size, double value) {
+  return ramp<T>(size, 0, value);
+}
+
 /// Writes by the extension: .mha, .mhd, .nrrd, .nhdr, .nii, .nii.gz, .tif, .png.
 template <class T>
 void write_itk(const std::filesystem::path& path, const ItkGrid<T>& grid, bool compressed = false);
+
+/// The bytes of such a file.
+template <class T>
+std::string itk_bytes(const std::string& extension, const ItkGrid<T>& grid, bool compressed = false) {
+  const TemporaryFolder folder;
+  write_itk(folder / ("a" + extension), grid, compressed);
+  return bytes_of(folder / ("a" + extension));
+}
 
 /// The distance of samples as ITK reads it from a MetaImage's header.
 std::vector<double> itk_meta_spacing(const std::filesystem::path& path);

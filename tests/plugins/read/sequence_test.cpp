@@ -1,49 +1,37 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <gtest/gtest.h>
-
-#include <fstream>
 #include <opencv2/videoio.hpp>
 
 #include "marrow/toolbox/track/sequence.hpp"
-#include "shipped.hpp"
 #include "tests/plugins/read/dicom_text.hpp"
-#include "tests/plugins/read/files.hpp"
 #include "tests/plugins/read/itk_files.hpp"
+#include "tests/plugins/read/reading.hpp"
 
 namespace sequence_test {
 
-using marrow::List;
-using marrow::test::ItkGrid;
-using marrow::test::put;
-using marrow::test::TemporaryFolder;
-using marrow::test::write_itk;
-using marrow::track::SequenceFrame;
+using namespace marrow;
+using namespace marrow::test;
+using Eigen::Vector3d;
+using track::SequenceFrame;
 using Path = std::filesystem::path;
 using Texts = std::vector<std::string>;
 
 /// An image of 6 x 4 pixels, all of one grey value.
 void put_image(const Path& path, int grey, unsigned height = 4) {
   std::filesystem::create_directories(path.parent_path());
-  write_itk(path, ItkGrid<std::uint8_t>{.size = {6, height},
-                                        .samples = std::vector<std::uint8_t>(6 * height, std::uint8_t(grey))});
+  write_itk(path, filled<std::uint8_t>({6, height}, grey));
 }
 
-class ReadSequence : public testing::Test {
+class ReadSequence : public InAFolder {
  protected:
   ReadSequence() {
     for (const int number : {9, 10, 11, 12})
       for (const char* view : {"a", "b"})
         put_image(folder / "both" / (std::string(view) + "_" + std::to_string(number) + ".png"), 10 * number);
-    put_camera("camera.txt", 6, 4);
+    put(folder / "camera.txt", xmalab_camera(6, 4));
     options["names"] = Texts{"a", "b"};
     options["images"] = Texts{folder / "both", folder / "both"};
     options["patterns"] = Texts{"a_*.png", "b_*.png"};
     options["cameras"] = Texts{folder / "camera.txt", folder / "camera.txt"};
-  }
-  void put_camera(const std::string& name, int width, int height) {
-    put(folder / name, "image size\n" + std::to_string(width) + "," + std::to_string(height) +
-                           "\n\ncamera matrix\n10,0,3\n0,10,2\n0,0,1\n\nrotation\n1,0,0\n0,1,0\n0,0,1\n\n"
-                           "translation\n0\n0\n600\n");
   }
   List<SequenceFrame> frames() {
     return shipped::call("read.sequence", {}, options).at("frames").as_list<SequenceFrame>();
@@ -61,7 +49,6 @@ class ReadSequence : public testing::Test {
     }
     return values;
   }
-  TemporaryFolder folder;
   shipped::Options options;
 };
 
@@ -75,8 +62,8 @@ TEST_F(ReadSequence, FilesOfAFolderInTheOrderOfTheirNumbers) {
     EXPECT_EQ(read[i].views[1].camera.camera_from_world.translation_mm.z(), 600);
   }
   const auto views = shipped::call("track.views", {{"frame", shipped::item(read[2])}}).at("views");
-  EXPECT_EQ(views.as_list<marrow::View>().names(), (Texts{"a", "b"}));
-  EXPECT_EQ(views.as_list<marrow::View>()[0].image.pixels.at<std::uint8_t>(0, 0), 110);
+  EXPECT_EQ(views.as_list<View>().names(), (Texts{"a", "b"}));
+  EXPECT_EQ(views.as_list<View>()[0].image.pixels.at<std::uint8_t>(0, 0), 110);
 }
 
 TEST_F(ReadSequence, PartsOfItAreNamedByTheirPlaceInTheWhole) {
@@ -96,11 +83,10 @@ TEST_F(ReadSequence, PartsOfItAreNamedByTheirPlaceInTheWhole) {
 TEST_F(ReadSequence, ImagesAreKnownByTheirContent) {
   const Path device = folder / "device";
   for (const int number : {1, 2}) {
-    auto elements = marrow::test::fluoroscopy();
-    elements[0x7FE00010] = "OW:" + std::string(2 * 24, char(number));
-    put(device / ("IM" + std::to_string(number)), marrow::test::dicom_file(elements));
+    const std::string pixels = "OW:" + std::string(2 * 24, char(number));
+    put(device / ("IM" + std::to_string(number)), dicom_file(but(fluoroscopy(), {{0x7FE00010, pixels}})));
   }
-  put(device / "DICOMDIR", marrow::test::dicom_file({}));
+  put(device / "DICOMDIR", dicom_file({}));
   put(device / "preview.jpg", "\xFF\xD8\xFF\xE0");
   put(device / "notes.txt", "two images");
   take(device);
@@ -121,18 +107,15 @@ TEST_F(ReadSequence, FoldersInFoldersByAPattern) {
 }
 
 TEST_F(ReadSequence, PagesOfATiffAndFramesOfADicomFile) {
-  std::vector<std::uint8_t> pages;
-  for (const int grey : {5, 6, 7}) pages.insert(pages.end(), 24, std::uint8_t(grey));
-  write_itk(folder / "stack.tif", ItkGrid<std::uint8_t>{.size = {6, 4, 3}, .samples = pages});
+  write_itk(folder / "stack.tif", ramp<std::uint8_t>({6, 4, 3}, 1 / 24.0, 5.01));
   take(folder / "stack.tif");
   EXPECT_EQ(greys(), (std::vector<int>{5, 6, 7}));
   options["first"] = std::int64_t(3);
   EXPECT_EQ(greys(), (std::vector<int>{7}));
-  marrow::test::Elements elements = marrow::test::fluoroscopy();
-  const std::string pixels = elements[0x7FE00010].substr(3);
-  elements[0x7FE00010] += std::string(pixels.size(), '\1') + pixels;
-  elements[0x00280008] = "IS:3";
-  put(folder / "run.dcm", marrow::test::dicom_file(elements));
+  const std::string pixels = fluoroscopy().at(0x7FE00010);
+  put(folder / "run.dcm",
+      dicom_file(
+          but(fluoroscopy(), {{0x00280008, "IS:3"}, {0x7FE00010, pixels + std::string(48, '\1') + pixels.substr(3)}})));
   take(folder / "run.dcm");
   EXPECT_EQ(greys(), (std::vector<int>{101, 257, 101}));
   options["patterns"] = Texts{"*"};
@@ -147,7 +130,7 @@ class Video : public ReadSequence {
                            {64, 48}, true);
     for (int k = 1; k <= 10; ++k) writer.write(cv::Mat(48, 64, CV_8UC3, cv::Scalar::all(20 * k)));
     writer.release();
-    put_camera("video.txt", 64, 48);
+    put(folder / "video.txt", xmalab_camera(64, 48));
     take(video, "video.txt");
   }
   const Path video = folder / "run.avi";
@@ -192,7 +175,7 @@ TEST_F(ReadSequence, DiagnosesFaults) {
   EXPECT_SAYS(frames(),
               "both: no file in it fits the pattern 'c_*.png'; there are 'a_10.png', 'a_11.png', 'a_12.png', "
               "'a_9.png', 'b_012.png' and 4 more");
-  put_camera("camera.txt", 7, 4);
+  put(folder / "camera.txt", xmalab_camera(7, 4));
   take(folder / "both");
   options["patterns"] = Texts{"a_*.png"};
   EXPECT_SAYS(frames(), "view 'a': the image has 6 x 4 pixels, but its camera is for 7 x 4");
@@ -207,15 +190,15 @@ TEST_F(ReadSequence, FilesOutsideTheFolderAreRefused) {
 }
 
 TEST_F(ReadSequence, ACameraForEachName) {
-  marrow::List<marrow::Camera> cameras;
-  cameras.add("a", marrow::Camera{6, 4, Eigen::Vector3d(10, 10, 1).asDiagonal(), {"camera", "world"}});
+  List<Camera> cameras;
+  cameras.add("a", Camera{6, 4, Vector3d(10, 10, 1).asDiagonal(), {"camera", "world"}});
   options.erase("cameras");
   EXPECT_EQ(shipped::refusal("read.sequence", {{"camera", shipped::list(cameras, "view")}}, options),
             "view 'b' has no camera of that name; there are 'a'");
-  EXPECT_TRUE(shipped::declares("read.sequence", marrow::same_length({"names", "images"})));
-  EXPECT_TRUE(shipped::declares("read.sequence", marrow::as_many_or_none("patterns", "names")));
-  EXPECT_TRUE(shipped::declares("read.sequence", marrow::exactly_one({"in.camera", "cameras"})));
-  EXPECT_TRUE(shipped::declares("read.sequence", marrow::as_many_or_none("cameras", "names")));
+  EXPECT_TRUE(shipped::declares("read.sequence", same_length({"names", "images"})));
+  EXPECT_TRUE(shipped::declares("read.sequence", as_many_or_none("patterns", "names")));
+  EXPECT_TRUE(shipped::declares("read.sequence", exactly_one({"in.camera", "cameras"})));
+  EXPECT_TRUE(shipped::declares("read.sequence", as_many_or_none("cameras", "names")));
 }
 
 }  // namespace sequence_test

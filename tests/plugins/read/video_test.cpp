@@ -1,13 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <gtest/gtest.h>
-
 #include <opencv2/core.hpp>
 
 #include "marrow/toolbox/track/sequence.hpp"
-#include "shipped.hpp"
-#include "tests/plugins/read/avi.hpp"
-#include "tests/plugins/read/files.hpp"
 #include "tests/plugins/read/itk_files.hpp"
+#include "tests/plugins/read/reading.hpp"
 
 extern "C" {
 #include <libavcodec/avcodec.h>
@@ -16,34 +12,60 @@ extern "C" {
 
 namespace video_test {
 
-using marrow::test::avi_file;
-using marrow::test::AviFrames;
-using marrow::test::ItkGrid;
-using marrow::test::put;
-using marrow::test::TemporaryFolder;
+using namespace marrow;
+using namespace marrow::test;
 using Path = std::filesystem::path;
 using Texts = std::vector<std::string>;
 
 constexpr int kWidth_px = 64, kHeight_px = 48;
 
-class DeepVideo : public testing::Test {
+/// Compressed frames, and what their AVI file says of them.
+struct AviFrames {
+  std::string codec;  ///< its four letters
+  std::vector<std::string> frames{};
+  std::string extra{};  ///< what the codec must know before the first frame
+};
+
+std::string avi_chunk(const std::string& name, const std::string& content) {
+  return name + little(content.size(), 4) + content + std::string(content.size() % 2, '\0');
+}
+
+/// An AVI file written by hand, 10 frames a second.
+std::string avi_file(const AviFrames& video) {
+  const auto numbers = [](const std::vector<std::size_t>& all, int bytes) {
+    std::string text;
+    for (const std::size_t number : all) text += little(number, bytes);
+    return text;
+  };
+  const std::size_t width = kWidth_px, height = kHeight_px, count = video.frames.size();
+  const std::string main = numbers({100000, 0, 0, 0, count, 0, 1, 0, width, height, 0, 0, 0, 0}, 4);
+  const std::string stream =
+      "vids" + video.codec + numbers({0, 0, 0, 1, 10, 0, count, 0, 0, 0}, 4) + numbers({0, 0, width, height}, 2);
+  const std::string format = numbers({40 + video.extra.size(), width, height}, 4) + numbers({1, 24}, 2) + video.codec +
+                             numbers({0, 0, 0, 0, 0}, 4) + video.extra;
+  std::string frames = "movi";
+  for (const std::string& frame : video.frames) frames += avi_chunk("00dc", frame);
+  const std::string header = "hdrl" + avi_chunk("avih", main) +
+                             avi_chunk("LIST", "strl" + avi_chunk("strh", stream) + avi_chunk("strf", format));
+  return avi_chunk("RIFF", "AVI " + avi_chunk("LIST", header) + avi_chunk("LIST", frames));
+}
+
+class DeepVideo : public InAFolder {
  protected:
-  DeepVideo() {
-    put(folder / "camera.txt",
-        "image size\n64,48\n\ncamera matrix\n10,0,3\n0,10,2\n0,0,1\n\nrotation\n1,0,0\n0,1,0\n0,0,1\n\n"
-        "translation\n0\n0\n600\n");
-  }
+  DeepVideo() { put(folder / "camera.txt", xmalab_camera(kWidth_px, kHeight_px)); }
   /// The frames of a file, as read.sequence gives them.
   std::vector<cv::Mat> read(const std::string& name) {
     const shipped::Options options{
         {"names", Texts{"a"}}, {"images", Texts{folder / name}}, {"cameras", Texts{folder / "camera.txt"}}};
     std::vector<cv::Mat> frames;
-    for (const auto& frame :
-         shipped::call("read.sequence", {}, options).at("frames").as_list<marrow::track::SequenceFrame>())
+    for (const auto& frame : shipped::call("read.sequence", {}, options).at("frames").as_list<track::SequenceFrame>())
       frames.push_back(frame.views.at(0).image.pixels);
     return frames;
   }
-  TemporaryFolder folder;
+  std::vector<cv::Mat> of(const std::string& name, const std::string& bytes) {
+    put(folder / name, bytes);
+    return read(name);
+  }
 };
 
 /// Grey value of a pixel of the k-th frame; the values of all bits occur.
@@ -54,7 +76,7 @@ AviFrames ffv1(AVPixelFormat kind, int black, int white) {
   const int bits = av_pix_fmt_desc_get(kind)->comp[0].depth;
   AVCodecContext* encoder = avcodec_alloc_context3(avcodec_find_encoder(AV_CODEC_ID_FFV1));
   encoder->width = kWidth_px, encoder->height = kHeight_px, encoder->pix_fmt = kind, encoder->time_base = {1, 10};
-  AviFrames video{"FFV1", kWidth_px, kHeight_px};
+  AviFrames video{"FFV1"};
   EXPECT_EQ(avcodec_open2(encoder, encoder->codec, nullptr), 0);
   video.extra.assign(reinterpret_cast<const char*>(encoder->extradata), std::size_t(encoder->extradata_size));
   AVFrame* frame = av_frame_alloc();
@@ -83,8 +105,7 @@ AviFrames ffv1(AVPixelFormat kind, int black, int white) {
 TEST_F(DeepVideo, GreyOf10To16BitsKeepsThem) {
   for (const auto& [kind, bits] :
        {std::pair{AV_PIX_FMT_GRAY10LE, 10}, {AV_PIX_FMT_GRAY12LE, 12}, {AV_PIX_FMT_GRAY16LE, 16}}) {
-    put(folder / "deep.avi", avi_file(ffv1(kind, 0, (1 << bits) - 1)));
-    const std::vector<cv::Mat> frames = read("deep.avi");
+    const std::vector<cv::Mat> frames = of("deep.avi", avi_file(ffv1(kind, 0, (1 << bits) - 1)));
     ASSERT_EQ(frames.size(), 3u);
     ASSERT_EQ(frames[2].type(), CV_16U) << bits;
     for (int v = 0; v < kHeight_px; ++v)
@@ -94,8 +115,7 @@ TEST_F(DeepVideo, GreyOf10To16BitsKeepsThem) {
 
 // By ITU-R BT.709, 10 bits of brightness run from 64 (black) to 940 (white). (v - 64) / 876 * 1023 is the level.
 TEST_F(DeepVideo, BrightnessBecomesLevelsFromBlackToWhite) {
-  put(folder / "colour.avi", avi_file(ffv1(AV_PIX_FMT_YUV444P10LE, 64, 940)));
-  const cv::Mat frame = read("colour.avi").at(1);
+  const cv::Mat frame = of("colour.avi", avi_file(ffv1(AV_PIX_FMT_YUV444P10LE, 64, 940))).at(1);
   ASSERT_EQ(frame.type(), CV_16U);
   for (int u = 0; u < kWidth_px; ++u) {
     const int stored = 64 + ramp(u, 3, 1, 10) % 877;
@@ -104,15 +124,10 @@ TEST_F(DeepVideo, BrightnessBecomesLevelsFromBlackToWhite) {
 }
 
 TEST_F(DeepVideo, PngFramesOf16BitsAreThoseThatItkWrote) {
-  AviFrames video{"MPNG", kWidth_px, kHeight_px};
-  for (int k = 0; k < 2; ++k) {
-    ItkGrid<std::uint16_t> image{.size = {kWidth_px, kHeight_px}};
-    for (int i = 0; i < kWidth_px * kHeight_px; ++i) image.samples.push_back(std::uint16_t(i * 21 + k * 500));
-    write_itk(folder / "frame.png", image);
-    video.frames.push_back(marrow::test::bytes_of(folder / "frame.png"));
-  }
-  put(folder / "named.bin", avi_file(video));  // the content tells that it is a video
-  const std::vector<cv::Mat> frames = read("named.bin");
+  AviFrames video{"MPNG"};
+  for (int k = 0; k < 2; ++k)
+    video.frames.push_back(itk_bytes(".png", marrow::test::ramp<std::uint16_t>({64, 48}, 21, k * 500)));
+  const std::vector<cv::Mat> frames = of("named.bin", avi_file(video));  // the content tells that it is a video
   ASSERT_EQ(frames.size(), 2u);
   ASSERT_EQ(frames[1].type(), CV_16U);
   EXPECT_EQ(frames[1].at<std::uint16_t>(2, 5), (2 * 64 + 5) * 21 + 500);
@@ -121,8 +136,7 @@ TEST_F(DeepVideo, PngFramesOf16BitsAreThoseThatItkWrote) {
 TEST_F(DeepVideo, AFrameThatCannotBeDecodedIsNamed) {
   AviFrames video = ffv1(AV_PIX_FMT_GRAY12LE, 0, 4095);
   video.codec = "ZZZZ";
-  put(folder / "odd.avi", avi_file(video));
-  EXPECT_SAYS(read("odd.avi"),
+  EXPECT_SAYS(of("odd.avi", avi_file(video)),
               "odd.avi: its frames are compressed by 'ZZZZ', for which FFmpeg has no decoder here; convert it, to FFV1 "
               "for example");
 }
@@ -139,29 +153,27 @@ TEST_F(DeepVideo, ListsOfOtherFilesAreRefused) {
        "is a description of a stream (DASH), not a video"}};
   for (const auto& [content, words] : lists)
     for (const char* name : {"list.avi", "list.mp4", "list.txt"}) {
-      put(folder / name, content);
-      EXPECT_SAYS(read(name), std::string(name) + ": " + words +
-                                  ": the frames are in other files, whose changes would go unnoticed; name the video "
-                                  "itself, or a folder of images");
+      EXPECT_SAYS(of(name, content),
+                  std::string(name) + ": " + words +
+                      ": the frames are in other files, whose changes would go unnoticed; name the video "
+                      "itself, or a folder of images");
     }
-  put(folder / "no.mov", "hello");
   EXPECT_SAYS(
-      read("no.mov"),
+      of("no.mov", "hello"),
       "no.mov: is not a video, or is damaged at its start; marrow reads AVI, MP4, MOV, MKV, WebM, WMV and MPEG");
 }
 
 // FFmpeg takes a name with % for a pattern of many images. Here the file's content alone counts.
 TEST_F(DeepVideo, NamesArePatternsOfNothing) {
   put(folder / "a%03d.png", avi_file(ffv1(AV_PIX_FMT_GRAY12LE, 0, 4095)));
-  write_itk(folder / "a001.png",
-            ItkGrid<std::uint8_t>{.size = {64, 48}, .samples = std::vector<std::uint8_t>(64 * 48)});
+  write_itk(folder / "a001.png", filled<std::uint8_t>({64, 48}, 0));
   EXPECT_EQ(read("a%03d.png").size(), 3u);
 }
 
 // A MOV may name the file with its frames in the box 'dref' (ISO 14496-12, 8.7.2): flag 1 means this file.
 TEST_F(DeepVideo, AMovWhoseFramesAreElsewhereIsRefused) {
   const auto box = [](const std::string& name, const std::string& content) {
-    const std::string bytes = marrow::test::little_endian(content.size() + 8, 4);
+    const std::string bytes = little(content.size() + 8, 4);
     return std::string(bytes.rbegin(), bytes.rend()) + name + content;
   };
   const auto mov = [&](char flag) {
@@ -171,11 +183,9 @@ TEST_F(DeepVideo, AMovWhoseFramesAreElsewhereIsRefused) {
            box("moov",
                box("trak", box("mdia", box("minf", box("dinf", box("dref", "\0\0\0\0\0\0\0\1"s + reference))))));
   };
-  put(folder / "away.mov", mov(0));
-  EXPECT_SAYS(read("away.mov"),
+  EXPECT_SAYS(of("away.mov", mov(0)),
               "away.mov: its frames are in another file, which it names; save it as one self-contained file");
-  put(folder / "here.mov", mov(1));
-  EXPECT_SAYS(read("here.mov"), "here.mov: holds no pictures that FFmpeg finds");
+  EXPECT_SAYS(of("here.mov", mov(1)), "here.mov: holds no pictures that FFmpeg finds");
 }
 
 }  // namespace video_test

@@ -1,46 +1,59 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <gtest/gtest.h>
-
+// Views: images with their cameras, and how exactly these are known.
 #include <cmath>
 #include <stdexcept>
 
-#include "shipped.hpp"
-#include "tests/plugins/read/files.hpp"
+#include "marrow/toolbox/geometry/camera_deviations.hpp"
 #include "tests/plugins/read/itk_files.hpp"
+#include "tests/plugins/read/reading.hpp"
 
 namespace views_test {
 
-using marrow::test::ItkGrid;
-using marrow::test::put;
-using marrow::test::TemporaryFolder;
-using marrow::test::write_itk;
+using namespace marrow;
+using namespace marrow::test;
+using geometry::CameraDeviations;
 
 std::vector<std::string> texts(const std::vector<std::filesystem::path>& paths) { return {paths.begin(), paths.end()}; }
 
-class ReadViews : public testing::Test {
+/// Two images of 6 x 4 pixels, whose values rise, with cameras.
+class ReadViews : public InAFolder {
  protected:
   ReadViews() {
-    for (const char* name : {"a.png", "b.png"})
-      write_itk(folder / name, ItkGrid<std::uint8_t>{.size = {6, 4}, .samples = std::vector<std::uint8_t>(24, 9)});
-    for (const char* name : {"a.txt", "b.txt"})
-      put(folder / name,
-          "image size\n6,4\n\ncamera "
-          "matrix\n10,0,3\n0,10,2\n0,0,1\n\nrotation\n1,0,0\n0,1,0\n0,0,1\n\ntranslation\n0\n0\n600\n");
+    for (const char* name : {"a", "b"}) {
+      write_itk(folder / (name + std::string(".png")), ramp<std::uint8_t>({6, 4}, 1));
+      put(folder / (name + std::string(".txt")), xmalab_camera(6, 4));
+    }
     options["names"] = std::vector<std::string>{"one", "two"};
     options["images"] = texts({folder / "a.png", folder / "b.png"});
     options["cameras"] = texts({folder / "a.txt", folder / "b.txt"});
   }
-  marrow::List<marrow::View> views(const shipped::Inputs& inputs = {}) {
-    return shipped::call("read.views", inputs, options).at("views").as_list<marrow::View>();
+  List<View> views(const shipped::Inputs& inputs = {}) {
+    return shipped::call("read.views", inputs, options).at("views").as_list<View>();
   }
-  TemporaryFolder folder;
   shipped::Options options;
 };
 
+TEST_F(ReadViews, OneTakesItsCameraFromAFileOrAValue) {
+  const View from_file = view_from(nullptr, {"frontal", folder / "a.png", folder / "a.txt"});
+  EXPECT_EQ(from_file.name, "frontal");
+  EXPECT_EQ(from_file.camera.width_px, 6);
+  Camera camera = from_file.camera;
+  camera.camera_from_world.translation_mm.z() = 700;
+  EXPECT_EQ(view_from(&camera, {"frontal", folder / "a.png"}).camera.camera_from_world.translation_mm.z(), 700);
+  EXPECT_TRUE(shipped::declares("read.view", exactly_one({"in.camera", "camera"})));
+  // The camera is that of the image that was turned over, so it stays as it is.
+  const View view = shipped::call("read.view", {{"camera", shipped::item(camera)}},
+                                  {{"image", (folder / "a.png").string()}, {"mirror", "upside_down"}})
+                        .at("view")
+                        .as<View>();
+  EXPECT_EQ(view.image.pixels.at<std::uint8_t>(0, 2), 3 * 6 + 2);
+  EXPECT_EQ(hash_of(view.camera), hash_of(camera));
+  camera.width_px = 7;
+  EXPECT_SAYS(view_from(&camera, {"frontal", folder / "a.png"}),
+              "view 'frontal': the image has 6 x 4 pixels, but its camera is for 7 x 4");
+}
+
 TEST_F(ReadViews, AllImagesAreTurnedOver) {
-  ItkGrid<std::uint8_t> pixels{.size = {6, 4}};
-  for (std::uint8_t i = 0; i < 24; ++i) pixels.samples.push_back(i);
-  write_itk(folder / "b.png", pixels);
   options["mirror"] = "left_right";
   EXPECT_EQ(views()[1].image.pixels.at<std::uint8_t>(1, 6 - 1 - 2), 6 + 2);
 }
@@ -57,21 +70,23 @@ TEST_F(ReadViews, AViewWithoutAnImageIsLeftOut) {
 }
 
 TEST_F(ReadViews, ImagesWithTheirCameras) {
-  put(folder / "b.txt", marrow::test::with(marrow::test::bytes_of(folder / "b.txt"), "600", "700"));
+  put(folder / "b.txt", xmalab_camera(6, 4, "700"));
   const auto value = views();
   EXPECT_EQ(value.names(), (std::vector<std::string>{"one", "two"}));
   EXPECT_EQ(value[1].name, "two");
   EXPECT_EQ(value[0].camera.camera_from_world.translation_mm.z(), 600);
   EXPECT_EQ(value[1].camera.camera_from_world.translation_mm.z(), 700);
+  write_itk(folder / "b.png", filled<std::uint8_t>({6, 5}, 9));
+  EXPECT_SAYS(views(), "view 'two': the image has 6 x 5 pixels, but its camera is for 6 x 4");
 }
 
 TEST_F(ReadViews, CamerasAsValuesAreFoundByName) {
-  marrow::List<marrow::Camera> cameras;
-  marrow::Camera camera{6, 4, Eigen::Vector3d(10, 10, 1).asDiagonal(), {"camera", "world"}};
-  camera.camera_from_world.translation_mm.z() = 2;
-  cameras.add("two", camera);
-  camera.camera_from_world.translation_mm.z() = 1;
-  cameras.add("one", camera);
+  List<Camera> cameras;
+  for (const auto& [name, z] : {std::pair{"two", 2}, {"one", 1}})
+    cameras.add(name, {6,
+                       4,
+                       Eigen::Vector3d(10, 10, 1).asDiagonal(),
+                       {"camera", "world", Eigen::Matrix3d::Identity(), Eigen::Vector3d(0, 0, z)}});
   options.erase("cameras");
   const shipped::Inputs wired{{"camera", shipped::list(cameras, "view")}};
   EXPECT_EQ(views(wired)[0].camera.camera_from_world.translation_mm.z(), 1);
@@ -79,23 +94,15 @@ TEST_F(ReadViews, CamerasAsValuesAreFoundByName) {
   EXPECT_SAYS(views(wired), "view 'three' has no camera of that name; there are 'two', 'one'");
 }
 
-TEST_F(ReadViews, DiagnosesFaults) {
-  write_itk(folder / "b.png", ItkGrid<std::uint8_t>{.size = {6, 5}, .samples = std::vector<std::uint8_t>(30, 9)});
-  EXPECT_SAYS(views(), "view 'two': the image has 6 x 5 pixels, but its camera is for 6 x 4");
-}
-
 TEST_F(ReadViews, DeclaresAnImageAndACameraForEachName) {
-  EXPECT_TRUE(shipped::declares("read.views", marrow::at_least_one({"names"})));
-  EXPECT_TRUE(shipped::declares("read.views", marrow::distinct("names")));
-  EXPECT_TRUE(shipped::declares("read.views", marrow::same_length({"names", "images"})));
-  EXPECT_TRUE(shipped::declares("read.views", marrow::exactly_one({"in.camera", "cameras"})));
-  EXPECT_TRUE(shipped::declares("read.views", marrow::as_many_or_none("cameras", "names")));
+  EXPECT_TRUE(shipped::declares("read.views", at_least_one({"names"})));
+  EXPECT_TRUE(shipped::declares("read.views", distinct("names")));
+  EXPECT_TRUE(shipped::declares("read.views", same_length({"names", "images"})));
+  EXPECT_TRUE(shipped::declares("read.views", exactly_one({"in.camera", "cameras"})));
+  EXPECT_TRUE(shipped::declares("read.views", as_many_or_none("cameras", "names")));
+  EXPECT_TRUE(shipped::declares("read.images", as_many_or_none("names", "paths")));
   options["cameras"] = texts({folder / "a.txt"});
   EXPECT_THROW(views(), std::out_of_range) << "nothing is read past the end of a list";
-}
-
-TEST(ReadImages, DeclaresANameForEachOrNone) {
-  EXPECT_TRUE(shipped::declares("read.images", marrow::as_many_or_none("names", "paths")));
 }
 
 TEST_F(ReadViews, RealWristPairs) {
@@ -107,7 +114,85 @@ TEST_F(ReadViews, RealWristPairs) {
   EXPECT_EQ(value[0].image.width(), 1760);
   const double angle = std::acos(
       value[0].camera.camera_from_world.rotation.row(2).dot(value[1].camera.camera_from_world.rotation.row(2)));
-  EXPECT_NEAR(marrow::degrees(angle), 110, 3) << "the cameras stand 110 degrees apart";
+  EXPECT_NEAR(degrees(angle), 110, 3) << "the cameras stand 110 degrees apart";
+}
+
+// ---- how exactly a camera is known, as a camera file or a case says it
+
+const std::string kArm =
+    "c_arm: {alpha_deg: 0, beta_deg: 0, source_to_detector_mm: {value: 1000, deviation: 40}, "
+    "source_to_isocentre_mm: {value: 600, deviation: 25}, pixel_mm: {value: 0.5, deviation: 0.015}}\n";
+
+class StatedDeviations : public ReadViews {
+ protected:
+  shipped::Outputs view(const std::string& camera) {
+    put(folder / "a.yaml", "marrow-camera: 1\nwidth_px: 6\nheight_px: 4\n" + camera);
+    return shipped::call("read.view", {},
+                         {{"image", (folder / "a.png").string()}, {"camera", (folder / "a.yaml").string()}});
+  }
+  CameraDeviations of_view(const std::string& camera) {
+    return view(camera).at("camera_deviations").as<CameraDeviations>();
+  }
+};
+
+TEST_F(StatedDeviations, OfDistancesAndPixels) {
+  const CameraDeviations stated = of_view(kArm);
+  EXPECT_NEAR(stated.focal_percent.value(), 5, 1e-12) << "4 % of the distance and 3 % of the pixel";
+  EXPECT_EQ(stated.source_mm, 25);
+  EXPECT_FALSE(stated.centre_px || stated.turn_deg || stated.shift_mm);
+  const Camera camera = view(kArm).at("view").as<View>().camera;
+  EXPECT_EQ(camera.intrinsics(0, 0), 2000) << "the values are as without a deviation";
+  EXPECT_EQ(camera.camera_from_world.translation_mm.z(), 600);
+}
+
+TEST_F(StatedDeviations, OfAnyCamera) {
+  const CameraDeviations stated = of_view(
+      "intrinsics: [[10, 0, 2.5], [0, 10, 1.5], [0, 0, 1]]\n"
+      "camera_from_world: {target: camera, source: world, rotation: [[1, 0, 0], [0, 1, 0], [0, 0, 1]], "
+      "translation_mm: [0, 0, 600]}\n"
+      "deviations: {turn_deg: 0.5, shift_mm: 2, focal_percent: 3, centre_px: 40, source_mm: 7}\n");
+  EXPECT_EQ(stated.turn_deg, 0.5);
+  EXPECT_EQ(stated.shift_mm, 2);
+  EXPECT_EQ(stated.focal_percent, 3);
+  EXPECT_EQ(stated.centre_px, 40);
+  EXPECT_EQ(stated.source_mm, 7);
+}
+
+TEST_F(StatedDeviations, WhatIsRefused) {
+  EXPECT_SAYS(view(kArm + "deviations: {focal_percent: 3}\n"),
+              "focal_percent: the deviations of the distances already give it; keep one of the two");
+  EXPECT_SAYS(view(kArm + "deviations: {centre: 3}\n"), "unknown key 'centre'");
+  EXPECT_SAYS(view(kArm + "deviations: {turn_deg: -1}\n"), "turn_deg: expected 0 to 45, got -1");
+  EXPECT_SAYS(view(with(kArm, "deviation: 40", "deviation: -4")),
+              "source_to_detector_mm: deviation: expected 0 to 10000, got -4");
+  EXPECT_SAYS(view(with(kArm, "value: 1000, ", "")), "value");
+}
+
+TEST_F(StatedDeviations, OfACaseAndItsCameraFiles) {
+  view(kArm);
+  put(folder / "case.yaml",
+      "marrow-case: 1\nct: ct.mha\nviews:\n"
+      "  - {name: frontal, image: a.png, camera: a.yaml}\n"
+      "  - {name: lateral, image: a.png, camera: {file: a.yaml, deviations: {centre_px: 30}}}\n"
+      "fragments: {distal: {seeds: [[0, 0, 1]]}}\n");
+  write_itk(folder / "ct.mha", filled<std::int16_t>({3, 3, 3}, 40));
+  const auto stated = shipped::call("read.case", {}, {{"path", folder.path().string()}})
+                          .at("camera_deviations")
+                          .as_list<CameraDeviations>();
+  ASSERT_EQ(stated.names(), (std::vector<std::string>{"frontal", "lateral"}));
+  EXPECT_NEAR(stated[0].focal_percent.value(), 5, 1e-12);
+  EXPECT_EQ(stated[1].centre_px, 30);
+  EXPECT_FALSE(stated[1].focal_percent) << "what the case says takes the place of the file's";
+}
+
+TEST_F(StatedDeviations, ACameraAloneDoesNotPassThemOn) {
+  view(kArm);
+  const auto warnings =
+      said_by([&](const Context& context) { read_by<Camera>("read.camera", folder / "a.yaml", {}, context); },
+              LogLevel::warning);
+  EXPECT_EQ(warnings, std::vector<std::string>{(folder / "a.yaml").string() +
+                                               ": states how exactly the camera is known; only read.view, read.views "
+                                               "and read.case pass that on, if they read the camera file themselves"});
 }
 
 }  // namespace views_test

@@ -15,11 +15,10 @@ namespace {
 using example_case::example;
 using example_case::example_view;
 using marrow::test::case_at;
-using marrow::test::TemporaryFolder;
+using WriteCase = marrow::test::InAFolder;
 using writing::write;
 
-TEST(WriteCase, ReadCaseGivesTheSameToTheLastBit) {
-  const TemporaryFolder folder;
+TEST_F(WriteCase, ReadCaseGivesTheSameToTheLastBit) {
   const marrow::Case written = example();
   write(written, folder / "case");
   const marrow::Case read = case_at(folder / "case");
@@ -30,10 +29,9 @@ TEST(WriteCase, ReadCaseGivesTheSameToTheLastBit) {
   EXPECT_EQ(marrow::hash_of(read.truth), marrow::hash_of(written.truth));
 }
 
-TEST(WriteCase, EachViewHasFilesOfItsOwn) {
+TEST_F(WriteCase, EachViewHasFilesOfItsOwn) {
   EXPECT_EQ(file_stems({"frontal", "view-2", "a/b", "a b", "view-3", "", std::string(300, 'x')}),
             (std::vector<std::string>{"frontal", "view-2", "view-4", "view-5", "view-3", "view-6", "view-7"}));
-  const TemporaryFolder folder;
   marrow::Case written = example();
   written.views = {};
   for (const char* name : {"view-2", "a/b", "a b", "a: b # c"})

@@ -1,26 +1,27 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <gtest/gtest.h>
 
-#include "tests/plugins/read/files.hpp"
 #include "tests/plugins/write/example_case.hpp"
 #include "tests/plugins/write/full_disk.hpp"
 #include "tests/plugins/write/writing.hpp"
 
 namespace case_test {
 
+using namespace marrow;
+using namespace marrow::test;
+using Eigen::Matrix3d;
 using example_case::example;
 using example_case::example_view;
-using marrow::test::TemporaryFolder;
 using writing::write;
 
-TEST(WriteCase, ReplacesAnEarlierOneAndWritesTheSameBytes) {
-  const TemporaryFolder folder;
-  const marrow::Case value = example();
+using WriteCase = InAFolder;
+using WriteView = InAFolder;
+
+TEST_F(WriteCase, ReplacesAnEarlierOneAndWritesTheSameBytes) {
+  const Case value = example();
   for (const char* name : {"case", "other", "case"}) write(value, folder / name);
   int files = 0;
   for (const auto& entry : std::filesystem::directory_iterator(folder / "case")) {
-    EXPECT_EQ(marrow::test::bytes_of(entry.path()),
-              marrow::test::bytes_of(folder / "other" / entry.path().filename().string()));
+    EXPECT_EQ(bytes_of(entry.path()), bytes_of(folder / "other" / entry.path().filename().string()));
     ++files;
   }
   EXPECT_EQ(files, 1 + 1 + 3 + 3 + 1);
@@ -29,18 +30,17 @@ TEST(WriteCase, ReplacesAnEarlierOneAndWritesTheSameBytes) {
   EXPECT_EQ(folders, 2) << "nothing temporary is left";
 }
 
-TEST(WriteCase, TextOfTheCase) {
-  const TemporaryFolder folder;
-  marrow::Case value = example();
+TEST_F(WriteCase, TextOfTheCase) {
+  Case value = example();
   value.seeds = {};
   value.seeds.add("null", {"null", {{1, 2, 3}}, false});
   value.seeds.add("a: \"b\"", {"a: \"b\"", {{0.1, 0.2, 0.3}, {1e-9, -1, 4}}, true});
   value.start = {};
-  value.start.add("a: \"b\"", marrow::Pose{});
+  value.start.add("a: \"b\"", Pose{});
   value.truth = {};
-  value.truth.add("a: \"b\"", {{"world", "ct", Eigen::Matrix3d::Identity(), {1, 2, 3}}});
+  value.truth.add("a: \"b\"", {{"world", "ct", Matrix3d::Identity(), {1, 2, 3}}});
   write(value, folder / "case");
-  EXPECT_EQ(marrow::test::bytes_of(folder / "case/case.yaml"), R"(marrow-case: 1
+  EXPECT_EQ(bytes_of(folder / "case/case.yaml"), R"(marrow-case: 1
 ct: ct.mha
 views:
   - name: "frontal"
@@ -82,55 +82,50 @@ fragments:
 )");
 }
 
-TEST(WriteCase, DiagnosesWhatReadCaseWouldNotTake) {
-  const TemporaryFolder folder;
-  const auto path = folder / "case";
-  marrow::Case value = example();
-  value.start.add("middle", marrow::Pose{});
-  EXPECT_SAYS(write(value, path), "case: fragment 'middle' has a start but no seeds");
-  value = example();
-  value.views = {};
-  EXPECT_SAYS(write(value, path), "case: the case has no view");
-  value = example();
-  value.views.add("frontal", example_view("frontal", CV_8U, 0));
-  EXPECT_SAYS(write(value, path), "case: two views are named 'frontal'");
-  value = example();
-  value.views.add("Frontal", example_view("Frontal", CV_8U, 0));
-  EXPECT_SAYS(write(value, path),
-              "case: the views 'frontal' and 'Frontal' are the same file on some file systems; rename one of them");
+TEST_F(WriteCase, DiagnosesWhatReadCaseWouldNotTake) {
+  const auto expect = [&](void (*change)(Case&), const std::string& said) {
+    Case value = example();
+    change(value);
+    EXPECT_SAYS(write(value, folder / "case"), said);
+  };
+  expect([](Case& c) { c.start.add("middle", Pose{}); }, "case: fragment 'middle' has a start but no seeds");
+  expect([](Case& c) { c.views = {}; }, "case: the case has no view");
+  expect([](Case& c) { c.views.add("frontal", example_view("frontal", CV_8U, 0)); },
+         "case: two views are named 'frontal'");
+  expect([](Case& c) { c.views.add("Frontal", example_view("Frontal", CV_8U, 0)); },
+         "case: the views 'frontal' and 'Frontal' are the same file on some file systems; rename one of them");
+  expect(
+      [](Case& c) {
+        c.seeds.add("distal", {"distal", {{1, 2, 3}}, false});
+      },
+      "case: two fragments are named 'distal'");
+  expect([](Case& c) { c.views.add("a\nb", example_view("a\nb", CV_8U, 0)); },
+         "case: the name 'a\\x0ab' of a view holds a character that cannot be printed; choose another");
+  expect(
+      [](Case& c) {
+        c.seeds.add("", {"", {{1, 2, 3}}, false});
+      },
+      "case: the name '' of a fragment is empty; choose another");
+  expect([](Case& c) { c.ct.values.pop_back(); }, ": ct: 24 voxels expected from its size, got 23");
+  EXPECT_FALSE(std::filesystem::exists(folder / "case"));
+  Case value = example();
   value.views = {};
   for (const char* name : {"View-2", "a/b"}) value.views.add(name, example_view(name, CV_8U, 0));
   write(value, folder / "other");
   EXPECT_TRUE(std::filesystem::exists(folder / "other/View-2.png"));
   EXPECT_TRUE(std::filesystem::exists(folder / "other/view-3.png"));
-  value = example();
-  value.seeds.add("distal", {"distal", {{1, 2, 3}}, false});
-  EXPECT_SAYS(write(value, path), "case: two fragments are named 'distal'");
-  value = example();
-  value.views.add("a\nb", example_view("a\nb", CV_8U, 0));
-  EXPECT_SAYS(write(value, path),
-              "case: the name 'a\\x0ab' of a view holds a character that cannot be printed; choose another");
-  value = example();
-  value.seeds.add("", {"", {{1, 2, 3}}, false});
-  EXPECT_SAYS(write(value, path), "case: the name '' of a fragment is empty; choose another");
-  value = example();
-  value.ct.values.pop_back();
-  EXPECT_SAYS(write(value, path), ": ct: 24 voxels expected from its size, got 23");
-  EXPECT_FALSE(std::filesystem::exists(path));
 }
 
-TEST(WriteCase, FullDiskLeavesNothing) {
-  const TemporaryFolder folder;
+TEST_F(WriteCase, FullDiskLeavesNothing) {
   const auto path = folder / "case";
   {
-    const marrow::test::FullDisk full(120);
+    const FullDisk full(120);
     EXPECT_SAYS(write(example(), path), "cannot be written");
   }
   EXPECT_TRUE(std::filesystem::is_empty(folder.path()));
 }
 
-TEST(WriteView, FolderWithImageAndCamera) {
-  const TemporaryFolder folder;
+TEST_F(WriteView, FolderWithImageAndCamera) {
   write(example_view("frontal", CV_16U, 0), folder / "frontal");
   EXPECT_TRUE(std::filesystem::exists(folder / "frontal/image.png"));
   EXPECT_TRUE(std::filesystem::exists(folder / "frontal/camera.yaml"));

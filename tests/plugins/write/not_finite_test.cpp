@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 // What no reader takes is not written: surfaces with wrong corners, and numbers that are not finite.
-#include <gtest/gtest.h>
 
 #include <limits>
 
@@ -13,19 +12,21 @@
 
 namespace not_finite_test {
 
-using marrow::test::TemporaryFolder;
+using namespace marrow;
+using namespace marrow::test;
+using Eigen::Vector3d;
 using writing::write;
 
 constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
 
-marrow::Mesh good() {
+Mesh good() {
   return {{{0, 0, 0}, {10, 0, 0}, {0, 20, 0}, {0, 0, 30}}, {{0, 2, 1}, {0, 1, 3}, {0, 3, 2}, {1, 2, 3}}, "ct"};
 }
 
 /// The surfaces that every writer must refuse, with the messages.
-std::vector<std::pair<marrow::Mesh, std::string>> bad_meshes() {
-  std::vector<std::pair<marrow::Mesh, std::string>> meshes;
-  marrow::Mesh mesh = good();
+std::vector<std::pair<Mesh, std::string>> bad_meshes() {
+  std::vector<std::pair<Mesh, std::string>> meshes;
+  Mesh mesh = good();
   mesh.triangles[1][2] = 9;
   meshes.emplace_back(mesh, "a triangle names vertex 9, but there are only 4");
   mesh = good();
@@ -33,7 +34,7 @@ std::vector<std::pair<marrow::Mesh, std::string>> bad_meshes() {
   meshes.emplace_back(mesh, "a vertex is not finite");
   mesh.vertices_mm[2].y() = std::numeric_limits<double>::infinity();
   meshes.emplace_back(mesh, "a vertex is not finite");
-  meshes.emplace_back(marrow::Mesh{}, "the surface has no triangles");
+  meshes.emplace_back(Mesh{}, "the surface has no triangles");
   return meshes;
 }
 
@@ -48,8 +49,8 @@ TEST(WriteNotFinite, Surfaces) {
   const TemporaryFolder folder;
   for (const auto& [mesh, text] : bad_meshes()) {
     expect_refused(folder, mesh, "a.ply", text);
-    expect_refused(folder, marrow::geometry::Implant{mesh, {{"a", {0, 0, 0}, {1, 0, 0}, 5}}}, "nail", text);
-    marrow::Scene scene;
+    expect_refused(folder, geometry::Implant{mesh, {{"a", {0, 0, 0}, {1, 0, 0}, 5}}}, "nail", text);
+    Scene scene;
     scene.models.push_back({"bone", mesh});
     EXPECT_SAYS((write(scene, folder / "scene.json"), 0), "model 'bone' of a scene: " + text);
     for (const char* format : {"obj", "vtp"})
@@ -59,8 +60,8 @@ TEST(WriteNotFinite, Surfaces) {
   }
 }
 
-marrow::Volume volume_with(float value) {
-  marrow::Volume volume;
+Volume volume_with(float value) {
+  Volume volume;
   volume.grid.size = {3, 4, 5};
   volume.values.assign(60, 100);
   volume.values[1 + 3 * (2 + 4 * 3)] = value;
@@ -70,19 +71,19 @@ marrow::Volume volume_with(float value) {
 TEST(WriteNotFinite, Volumes) {
   const TemporaryFolder folder;
   for (const float value : {float(kNone), std::numeric_limits<float>::infinity()}) {
-    const marrow::Volume volume = volume_with(value);
+    const Volume volume = volume_with(value);
     expect_refused(folder, volume, "ct.mha", "voxel (1, 2, 3) is not a finite number; replace NaN and infinities");
-    expect_refused(folder, marrow::SignedField{volume.grid, volume.values}, "field.mha",
+    expect_refused(folder, SignedField{volume.grid, volume.values}, "field.mha",
                    "cannot be written, because voxel (1, 2, 3) is not a finite number");
   }
 }
 
-marrow::View view_with(float value) {
-  marrow::View view;
+View view_with(float value) {
+  View view;
   view.name = "ap";
   view.image.pixels = cv::Mat(4, 5, CV_32F, cv::Scalar(1));
   view.image.pixels.at<float>(2, 3) = value;
-  view.camera = {5, 4, Eigen::Vector3d(10, 10, 1).asDiagonal(), {"camera", "world"}};
+  view.camera = {5, 4, Vector3d(10, 10, 1).asDiagonal(), {"camera", "world"}};
   return view;
 }
 
@@ -90,18 +91,18 @@ TEST(WriteNotFinite, Images) {
   const TemporaryFolder folder;
   const std::string text = "cannot be written, because pixel (3, 2) is not a finite number; replace NaN and infinities";
   for (const float value : {float(kNone), -std::numeric_limits<float>::infinity()}) {
-    const marrow::View view = view_with(value);
+    const View view = view_with(value);
     expect_refused(folder, view.image, "a.png", text);
     EXPECT_SAYS((write(view, folder / "view"), 0), "pixel (3, 2) is not a finite number");
-    EXPECT_SAYS((marrow::write::write_pixels(folder / "a.tif", view.image.pixels), 0), text);
+    EXPECT_SAYS((write::write_pixels(folder / "a.tif", view.image.pixels), 0), text);
   }
-  expect_refused(folder, marrow::EdgeMap{6, 4, {{float(kNone), 1, 1, 0, 50}}}, "edges.png",
+  expect_refused(folder, EdgeMap{6, 4, {{float(kNone), 1, 1, 0, 50}}}, "edges.png",
                  "cannot be written, because the place of an edge is not a finite number");
 }
 
 TEST(WriteNotFinite, Cases) {
   const TemporaryFolder folder;
-  marrow::Case one;
+  Case one;
   one.ct = volume_with(float(kNone));
   one.views.add("ap", view_with(1));
   one.seeds.add("distal", {});
@@ -110,30 +111,29 @@ TEST(WriteNotFinite, Cases) {
 
 TEST(WriteNotFinite, PosesAndCameras) {
   const TemporaryFolder folder;
-  marrow::Pose pose;
+  Pose pose;
   pose.world_from_model.translation_mm.x() = kNone;
   expect_refused(folder, pose, "pose.yaml", "the transform has a number that is not finite");
-  expect_refused(folder, marrow::Truth{pose.world_from_model}, "truth.yaml",
-                 "the transform has a number that is not finite");
-  marrow::Camera camera = view_with(1).camera;
+  expect_refused(folder, Truth{pose.world_from_model}, "truth.yaml", "the transform has a number that is not finite");
+  Camera camera = view_with(1).camera;
   camera.camera_from_world.translation_mm.x() = kNone;
   expect_refused(folder, camera, "camera.yaml", "the transform has a number that is not finite");
   EXPECT_EQ(shipped::refusal("write.tfm", {{"pose", shipped::item(pose)}}),
             "the pose cannot be written as .tfm: the transform has a number that is not finite");
-  marrow::List<marrow::Camera> cameras;
+  List<Camera> cameras;
   cameras.add("ap", camera);
   for (const char* node : {"write.rtk", "write.xreg"})
     EXPECT_EQ(
         shipped::refusal(node, {{"cameras", shipped::list(cameras, "view")}}, {{"pixel_mm", std::vector<double>{1}}}),
         "the camera of 'ap': the transform has a number that is not finite");
-  marrow::Scene scene;
+  Scene scene;
   scene.placements.push_back({"bone", "result", pose.world_from_model});
   EXPECT_SAYS((write(scene, folder / "scene.json"), 0),
               "pose 'result' of a scene: the transform has a number that is not finite");
 }
 
 TEST(WriteNotFinite, PointsOf3dSlicer) {
-  const marrow::Seeds seeds{"distal", {{1, 2, 3}, {1, kNone, 3}}};
+  const Seeds seeds{"distal", {{1, 2, 3}, {1, kNone, 3}}};
   for (const char* node : {"write.markups", "write.fcsv"})
     EXPECT_EQ(shipped::refusal(node, {{"seeds", shipped::item(seeds)}}),
               "point 'distal-2' has a coordinate that is not a finite number");

@@ -7,23 +7,28 @@
 #include <limits>
 
 #include "marrow/base/yaml.hpp"
+#include "tests/plugins/read/files.hpp"
 
 namespace yaml_text_test {
+
+using namespace marrow;
+using namespace marrow::test;
+using Eigen::Matrix3d;
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 std::string truth_between(const std::string& target, const std::string& source) {
-  return marrow::files::truth({{target, source, Eigen::Matrix3d::Identity(), {0.1, -2.5, 1e300}}});
+  return files::truth({{target, source, Matrix3d::Identity(), {0.1, -2.5, 1e300}}});
 }
 
 TEST(YamlText, NumbersAreTheShortestThatReadAsTheSame) {
-  EXPECT_EQ(marrow::files::number(0.1), "0.1");
-  EXPECT_EQ(marrow::files::number(0.1 + 0.2), "0.30000000000000004");
-  EXPECT_EQ(marrow::files::number(-0.0), "-0");
-  EXPECT_EQ(marrow::files::number(100000), "1e+05");
-  EXPECT_EQ(marrow::files::number(std::nan("")), ".nan");
-  EXPECT_EQ(marrow::files::number(kInfinity), ".inf");
-  EXPECT_EQ(marrow::files::number(-kInfinity), "-.inf");
+  EXPECT_EQ(files::number(0.1), "0.1");
+  EXPECT_EQ(files::number(0.1 + 0.2), "0.30000000000000004");
+  EXPECT_EQ(files::number(-0.0), "-0");
+  EXPECT_EQ(files::number(100000), "1e+05");
+  EXPECT_EQ(files::number(std::nan("")), ".nan");
+  EXPECT_EQ(files::number(kInfinity), ".inf");
+  EXPECT_EQ(files::number(-kInfinity), "-.inf");
 }
 
 TEST(YamlText, Truth) {
@@ -39,9 +44,9 @@ matrix:  # world_from_ct, mm
 }
 
 TEST(YamlText, Landmarks) {
-  marrow::Landmarks landmarks;
+  Landmarks landmarks;
   landmarks.points = {{"a", {1, 2, 3}}, {"b", {0.1, 0, -1}}};
-  EXPECT_EQ(marrow::files::landmarks(landmarks, "bone"), R"(marrow-landmarks: 1
+  EXPECT_EQ(files::landmarks(landmarks, "bone"), R"(marrow-landmarks: 1
 fragments:
   "bone":
     points:  # mm, in CT coordinates
@@ -50,7 +55,7 @@ fragments:
 )");
   landmarks.seen = {{"a", "left", {10, 20.5}}, {"a", "right", {11, 21}}, {"b", "left", {12, 22}}};
   landmarks.tracked = {{"b", {7, 8, 9}}};
-  EXPECT_EQ(marrow::files::landmarks(landmarks, "yes"), R"(marrow-landmarks: 1
+  EXPECT_EQ(files::landmarks(landmarks, "yes"), R"(marrow-landmarks: 1
 fragments:
   "yes":
     points:  # mm, in CT coordinates
@@ -66,7 +71,7 @@ fragments:
       "b": [7, 8, 9]
 )");
   landmarks.seen[0].deviation_px = 1.5;
-  EXPECT_NE(marrow::files::landmarks(landmarks, "bone").find(R"(    seen:  # px, [u, v, deviation] by view
+  EXPECT_NE(files::landmarks(landmarks, "bone").find(R"(    seen:  # px, [u, v, deviation] by view
       "left":
         "a": [10, 20.5, 1.5]
         "b": [12, 22]
@@ -76,49 +81,40 @@ fragments:
 
 TEST(YamlText, OddNamesAreQuotedAndReadBack) {
   const std::string long_name(2000, 'w');
-  const std::pair<std::string, std::string> names[] = {{"Left-1_b", "Left-1_b"},
-                                                       {long_name, long_name},
-                                                       {"yes", R"("yes")"},
-                                                       {"Off", R"("Off")"},
-                                                       {"null", R"("null")"},
-                                                       {"~", R"("~")"},
-                                                       {"1", R"("1")"},
-                                                       {"1e5", R"("1e5")"},
-                                                       {"0x10", R"("0x10")"},
-                                                       {".inf", R"(".inf")"},
-                                                       {"", R"("")"},
-                                                       {" a ", R"(" a ")"},
-                                                       {"a: b", R"("a: b")"},
-                                                       {"#x", R"("#x")"},
-                                                       {"x #y", R"("x #y")"},
-                                                       {"- x", R"("- x")"},
-                                                       {"[a]", R"("[a]")"},
-                                                       {"&a", R"("&a")"},
-                                                       {"a, b", R"("a, b")"},
-                                                       {"a\nb: 1", R"("a\nb: 1")"},
-                                                       {"a\tb", R"("a\tb")"},
-                                                       {"\x07", R"("\x07")"},
-                                                       {"\"\\", R"("\"\\")"},
-                                                       {"ä", R"("ä")"},
-                                                       {"日本", R"("日本")"},
-                                                       {"\x1b[1m", R"("\x1b[1m")"}};
-  for (const auto& [name, written] : names) {
+  for (const std::string name : {"Left-1_b", long_name.c_str(),
+                                 "yes",      "Off",
+                                 "null",     "~",
+                                 "1",        "1e5",
+                                 "0x10",     ".inf",
+                                 "",         " a ",
+                                 "a: b",     "#x",
+                                 "x #y",     "- x",
+                                 "[a]",      "&a",
+                                 "a, b",     "a\nb: 1",
+                                 "a\tb",     "\x07",
+                                 "\"\\",     "ä",
+                                 "日本",     "\x1b[1m"}) {
+    const bool is_plain = name == "Left-1_b" || name == long_name;
+    std::string escaped = with_each(with_each(name, "\\", "\\\\"), "\"", "\\\"");
+    escaped = with_each(with_each(escaped, "\n", "\\n"), "\t", "\\t");
+    escaped = with_each(with_each(escaped, "\x07", "\\x07"), "\x1b", "\\x1b");
+    const std::string written = is_plain ? name : "\"" + escaped + "\"";
     const std::string text = truth_between("world", name);
     EXPECT_NE(text.find("\nsource: " + written + "\nmatrix:  # world_from_" + written + ", mm\n  - ["),
               std::string::npos)
         << text;
-    const YAML::Node read = marrow::parse_yaml(text);
+    const YAML::Node read = parse_yaml(text);
     EXPECT_EQ(read.size(), 4u) << text;
     EXPECT_EQ(read["source"].Scalar(), name);
-    EXPECT_EQ(read["source"].Tag(), name == written ? "?" : "!") << "a text, whatever it looks like";
+    EXPECT_EQ(read["source"].Tag(), is_plain ? "?" : "!") << "a text, whatever it looks like";
   }
 }
 
 TEST(YamlText, Camera) {
-  marrow::Camera camera{640, 480, Eigen::Matrix3d::Identity(), {"camera", "world"}};
+  Camera camera{640, 480, Matrix3d::Identity(), {"camera", "world"}};
   camera.intrinsics << 1000.5, 0, 320, 0, 1e6, 240, 0, 0, 1;
   camera.camera_from_world.translation_mm = {1, 2, 600};
-  EXPECT_EQ(marrow::files::camera(camera), R"(marrow-camera: 1
+  EXPECT_EQ(files::camera(camera), R"(marrow-camera: 1
 width_px: 640
 height_px: 480
 intrinsics:  # pixel = intrinsics * camera point, divided by the third coordinate
@@ -156,8 +152,8 @@ matrix:  # world_from_ct, mm
 const std::string kDeviationsOfPose =
     "predicted_deviation:  # one standard deviation about and along the fragment's frontal, lateral and long axes\n";
 
-marrow::Pose example_pose() {
-  marrow::Pose pose;
+Pose example_pose() {
+  Pose pose;
   pose.frame.origin_mm = {10, 20, 30};
   pose.frame.axes << 0, 1, 0, 0, 0, 1, 1, 0, 0;
   pose.frame.is_anatomical = true;
@@ -165,14 +161,14 @@ marrow::Pose example_pose() {
 }
 
 TEST(YamlText, PoseOfASearch) {
-  marrow::Pose pose = example_pose();
-  pose.covariance = marrow::Matrix6d(marrow::Vector6d(0, 0, 0, 4, 0.25, 9).asDiagonal());
+  Pose pose = example_pose();
+  pose.covariance = Matrix6d(Vector6d(0, 0, 0, 4, 0.25, 9).asDiagonal());
   (*pose.covariance)(0, 5) = -1e-5;
   pose.warnings = {"mind: the \"gap\"", "1", "a\nb", ""};
   pose.cost = -0.125;
   pose.evaluations = 20;
   pose.convergence = {{10, 2.5}, {20, kInfinity}};
-  EXPECT_EQ(marrow::files::pose(pose), kTransformOfPose + kDeviationsOfPose + R"(  rotation_deg: [0, 0, 0]
+  EXPECT_EQ(files::pose(pose), kTransformOfPose + kDeviationsOfPose + R"(  rotation_deg: [0, 0, 0]
   translation_mm: [2, 0.5, 3]
 warnings:
   - "mind: the \"gap\""
@@ -195,26 +191,26 @@ convergence:  # evaluations, and the least cost after them
 }
 
 TEST(YamlText, PoseWithoutAxesOfItsFragment) {
-  marrow::Pose pose;
-  EXPECT_EQ(marrow::files::pose(pose), kTransformOfPose + "warnings: []\ncost: 0\nevaluations: 0\n");
+  Pose pose;
+  EXPECT_EQ(files::pose(pose), kTransformOfPose + "warnings: []\ncost: 0\nevaluations: 0\n");
   pose = example_pose();
   pose.frame.is_anatomical = false;
-  EXPECT_NE(marrow::files::pose(pose).find("    - [1, 0, 0]\n  anatomical: false\n"), std::string::npos);
+  EXPECT_NE(files::pose(pose).find("    - [1, 0, 0]\n  anatomical: false\n"), std::string::npos);
 }
 
 TEST(YamlText, PoseOfWhichLittleIsKnown) {
-  marrow::Pose pose = example_pose();
+  Pose pose = example_pose();
   pose.cost = kInfinity;
-  EXPECT_EQ(marrow::files::pose(pose), kTransformOfPose + "warnings: []\nevaluations: 0\n" + kFrameOfPose);
-  pose.covariance = marrow::Matrix6d::Constant(kInfinity);
-  EXPECT_EQ(marrow::files::pose(pose), kTransformOfPose + kDeviationsOfPose +
-                                           "  rotation_deg: [.inf, .inf, .inf]\n  translation_mm: [.inf, .inf, .inf]\n"
-                                           "warnings: []\nevaluations: 0\n" +
-                                           kFrameOfPose);
+  EXPECT_EQ(files::pose(pose), kTransformOfPose + "warnings: []\nevaluations: 0\n" + kFrameOfPose);
+  pose.covariance = Matrix6d::Constant(kInfinity);
+  EXPECT_EQ(files::pose(pose), kTransformOfPose + kDeviationsOfPose +
+                                   "  rotation_deg: [.inf, .inf, .inf]\n  translation_mm: [.inf, .inf, .inf]\n"
+                                   "warnings: []\nevaluations: 0\n" +
+                                   kFrameOfPose);
 }
 
 TEST(YamlText, ShaftLines) {
-  marrow::ShaftLines lines;
+  ShaftLines lines;
   lines.left = {{1, 2}, {3, 4.5}};
   lines.right = {{5, 6}, {7, -8}};
   lines.width_mm = 27.5;
@@ -227,10 +223,10 @@ width_mm: 27.5
 width_deviation_mm: .nan
 log_likelihood: -.inf
 )";
-  EXPECT_EQ(marrow::files::shaft_lines(lines), best + "rejected: []\n");
+  EXPECT_EQ(files::shaft_lines(lines), best + "rejected: []\n");
   const std::string reason = "canal: " + std::string(1500, 'x');
   lines.rejected = {{lines.left, lines.right, reason}, {lines.right, lines.left, "no"}};
-  EXPECT_EQ(marrow::files::shaft_lines(lines), best + R"(rejected:
+  EXPECT_EQ(files::shaft_lines(lines), best + R"(rejected:
   - left: {from_px: [1, 2], to_px: [3, 4.5]}
     right: {from_px: [5, 6], to_px: [7, -8]}
     reason: ")" + reason + R"("
@@ -241,7 +237,7 @@ log_likelihood: -.inf
 }
 
 TEST(YamlText, Seeds) {
-  EXPECT_EQ(marrow::files::seeds({"distal: \"2\"", {{0.1, 0.2, 1.0 / 3}, {1, 2, 3}}, false}), R"(marrow-seeds: 1
+  EXPECT_EQ(files::seeds({"distal: \"2\"", {{0.1, 0.2, 1.0 / 3}, {1, 2, 3}}, false}), R"(marrow-seeds: 1
 fragments:
   "distal: \"2\"":
     seeds:  # mm, in CT coordinates

@@ -1,7 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """What the tests of trainings share: they end with 77 where a package of the trainings is missing."""
 import importlib
+import os
+import pathlib
+import subprocess
 import sys
+import tempfile
+import unittest
 
 import numpy as np
 from harness import SOURCE
@@ -15,6 +20,19 @@ for module, package in {"torch": "python3-torch", "onnx": "python3-onnx", "cv2":
     except ImportError:
         print("skipped: a training needs %s, which is not installed" % package)
         sys.exit(77)
+
+
+class InAFolder(unittest.TestCase):
+    def setUp(self):
+        folder = tempfile.TemporaryDirectory()
+        self.addCleanup(folder.cleanup)
+        self.folder = pathlib.Path(folder.name)
+
+
+def train(*words, **environment):
+    """Runs tools/networks/train."""
+    command = [sys.executable, str(TRAIN), *map(str, words)]
+    return subprocess.run(command, text=True, capture_output=True, env={**os.environ, **environment})
 
 
 def view_of_discs(random, size_px=96):

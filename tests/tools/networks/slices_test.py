@@ -3,9 +3,6 @@
 import contextlib
 import io
 import json
-import pathlib
-import subprocess
-import sys
 import tempfile
 import unittest
 import unittest.mock
@@ -110,27 +107,20 @@ class Figures(unittest.TestCase):
         self.assertEqual(scan.bone[5, 36, 36], 1)
 
 
-class SmallestCase(unittest.TestCase):
+class SmallestCase(network_cases.InAFolder):
     def test_a_network_is_trained_exported_and_used(self):
-        with tempfile.TemporaryDirectory() as name:
-            folder = pathlib.Path(name)
-            for seed in (1000, 1001, 2000, 3000):
-                write_case(folder, seed)
-            words = ["slices", "--data", folder, "--out", folder / "out", "--training", 2, "--choice", 1]
-            words += ["--judgement", 1, "--steps", 60]
-            ran = subprocess.run(
-                [sys.executable, str(network_cases.TRAIN), *map(str, words)], capture_output=True, text=True
-            )
-            self.assertEqual(ran.returncode, 0, ran.stderr)
-            figures = json.loads((folder / "out/figures.json").read_text())
-            self.assertEqual(set(figures), {"training", "choice", "judgement"})
-            self.assertGreater(figures["judgement"]["dice"], 0.8)
-            card = yaml.safe_load((folder / "out/slices.yaml").read_text())
-            self.assertEqual(card["input"]["slices"], 3)
-            self.check_node(folder)
-
-    def check_node(self, folder):
-        """segment.network finds the rod with the exported network, within what the figures say."""
+        folder = self.folder
+        for seed in (1000, 1001, 2000, 3000):
+            write_case(folder, seed)
+        words = ["--data", folder, "--out", folder / "out", "--training", 2, "--choice", 1, "--judgement", 1]
+        ran = network_cases.train("slices", *words, "--steps", 60)
+        self.assertEqual(ran.returncode, 0, ran.stderr)
+        figures = json.loads((folder / "out/figures.json").read_text())
+        self.assertEqual(set(figures), {"training", "choice", "judgement"})
+        self.assertGreater(figures["judgement"]["dice"], 0.8)
+        card = yaml.safe_load((folder / "out/slices.yaml").read_text())
+        self.assertEqual(card["input"]["slices"], 3)
+        # segment.network finds the rod with the exported network, within what the figures say.
         values, bone = rods(3001)
         grid = formats.straight(values.shape[::-1], spacing_mm=SPACING_MM)
         (folder / "ct.mha").write_bytes(formats.mha(grid, values.round().astype(int).ravel()))

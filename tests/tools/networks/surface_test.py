@@ -2,15 +2,11 @@
 """The training for a user's own surface: its points, shadows and images, whose truth is known, and its smallest case
 up to the nodes that use what it exports."""
 import json
-import pathlib
-import subprocess
-import tempfile
 import unittest
 import unittest.mock
 
 import network_cases  # skips where a package is missing
 import numpy as np
-from harness import BUILD, SOURCE
 import shadows
 import surface
 import surface_images
@@ -149,30 +145,28 @@ class Images(unittest.TestCase):
         self.assertLess(maps[1].max(), 1e-6)
 
 
-class SmallestTraining(unittest.TestCase):
+class SmallestTraining(network_cases.InAFolder):
     def test_a_wedge_ends_as_a_network_that_the_nodes_read(self):
-        with tempfile.TemporaryDirectory() as temporary:
-            folder = pathlib.Path(temporary)
-            corners, triangles = box([60, 40, 20])
-            corners[4:, 0] *= 0.3  # a wedge
-            write_stl(folder / "wedge.stl", corners, triangles)
-            command = [SOURCE / "tools/networks/train", "surface", folder / "wedge.stl", "--data", folder / "data"]
-            command += ["--out", folder / "out", "--steps", 2, "--shadows", 16, "--anatomies", 1, "--points", 5]
-            done = subprocess.run([str(word) for word in command], capture_output=True, text=True)
-            self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
-            figures = json.loads((folder / "out/figures.json").read_text())
-            self.assertEqual(len(figures["losses"]), 2)
-            self.assertIn("points_median_mm", figures["judgement"])
-            package = shadows.marrow()
-            camera = package.Camera(200, 220, [[900, 0, 99.5], [0, 900, 109.5], [0, 0, 1]], np.eye(4))
-            grey = np.random.default_rng(1).integers(0, 60000, (220, 200)).astype("uint16")
-            view = package.View(grey, camera, name="front")
-            masked = package.mask.network(
-                view, network=folder / "out/wedge.yaml", leave_out=["background"], object_distance_mm=900, margin_px=0
-            )
-            self.assertEqual(np.asarray(masked.mask).shape, (220, 200))
-            points = package.read.landmarks(path=folder / "out/wedge-points.yaml", fragment="part")
-            self.assertEqual(list(points["part"].points_mm), ["p1", "p2", "p3", "p4", "p5"])
+        folder = self.folder
+        corners, triangles = box([60, 40, 20])
+        corners[4:, 0] *= 0.3  # a wedge
+        write_stl(folder / "wedge.stl", corners, triangles)
+        words = ["--data", folder / "data", "--out", folder / "out", "--steps", 2, "--shadows", 16]
+        done = network_cases.train("surface", folder / "wedge.stl", *words, "--anatomies", 1, "--points", 5)
+        self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
+        figures = json.loads((folder / "out/figures.json").read_text())
+        self.assertEqual(len(figures["losses"]), 2)
+        self.assertIn("points_median_mm", figures["judgement"])
+        package = shadows.marrow()
+        camera = package.Camera(200, 220, [[900, 0, 99.5], [0, 900, 109.5], [0, 0, 1]], np.eye(4))
+        grey = np.random.default_rng(1).integers(0, 60000, (220, 200)).astype("uint16")
+        view = package.View(grey, camera, name="front")
+        masked = package.mask.network(
+            view, network=folder / "out/wedge.yaml", leave_out=["background"], object_distance_mm=900, margin_px=0
+        )
+        self.assertEqual(np.asarray(masked.mask).shape, (220, 200))
+        points = package.read.landmarks(path=folder / "out/wedge-points.yaml", fragment="part")
+        self.assertEqual(list(points["part"].points_mm), ["p1", "p2", "p3", "p4", "p5"])
 
 
 if __name__ == "__main__":

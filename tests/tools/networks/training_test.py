@@ -2,10 +2,7 @@
 """The network, the loop that trains it, and its export."""
 import contextlib
 import io
-import os
 import pathlib
-import subprocess
-import sys
 import tempfile
 import unittest
 import unittest.mock
@@ -45,13 +42,6 @@ def same(one, other):
     return all(torch.equal(a, b) for a, b in zip(one.state_dict().values(), other.state_dict().values()))
 
 
-class InAFolder(unittest.TestCase):
-    def setUp(self):
-        folder = tempfile.TemporaryDirectory()
-        self.addCleanup(folder.cleanup)
-        self.folder = pathlib.Path(folder.name)
-
-
 class Network(unittest.TestCase):
     def test_each_head_has_its_channels_and_stride(self):
         network = UNet(3, {"classes": Head(4), "points": Head(7, 4)}, widths=(4, 8, 12))
@@ -83,7 +73,7 @@ class Settling(unittest.TestCase):
         self.assertTrue(torch.allclose(norm.running_mean, mean, atol=1e-5))
 
 
-class Loop(InAFolder):
+class Loop(network_cases.InAFolder):
     def test_the_loss_falls_and_the_same_seed_gives_the_same_network(self):
         network, losses = trained(self.folder)
         self.assertLess(np.mean(losses[-5:]), 0.5 * np.mean(losses[:5]))
@@ -129,7 +119,7 @@ class Loop(InAFolder):
         np.testing.assert_allclose(rates, [0.4, 2, 2, 1.0408, 0.0405], atol=0.02)
 
 
-class Export(InAFolder):
+class Export(network_cases.InAFolder):
     CARD = {
         "file": "sums",
         "marrow-network": 1,
@@ -171,21 +161,17 @@ class Export(InAFolder):
                 self.write()
 
 
-class Command(InAFolder):
-    def run_train(self, *words, **environment):
-        command = [sys.executable, str(network_cases.TRAIN), *map(str, words)]
-        return subprocess.run(command, text=True, capture_output=True, env={**os.environ, **environment})
-
+class Command(network_cases.InAFolder):
     def test_says_which_packages_are_missing(self):
         for module in ("torch", "cv2"):
             (self.folder / (module + ".py")).write_text("raise ImportError")
-        done = self.run_train("bones", "--data", "d", "--out", "o", PYTHONPATH=str(self.folder))
+        done = network_cases.train("bones", "--data", "d", "--out", "o", PYTHONPATH=str(self.folder))
         self.assertEqual(done.returncode, 1)
         wanted = "train: a training needs packages that are not there: apt install python3-torch python3-opencv\n"
         self.assertEqual(done.stderr, wanted)
 
     def test_help_names_the_networks(self):
-        done = self.run_train("--help", PYTHONPATH="")
+        done = network_cases.train("--help", PYTHONPATH="")
         self.assertEqual(done.returncode, 0)
         self.assertIn("networks: bones", done.stdout)
 

@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 // Cameras that were calibrated in another unit than mm. A camera's matrix counts pixels, so only its place depends on
 // the unit: 10 times that of the file for cm.
-#include <gtest/gtest.h>
-
 #include "marrow/toolbox/files/samples_out.hpp"
 #include "tests/plugins/toolbox/exchange/values.hpp"
 
 namespace camera_scale_test {
 
+using namespace marrow;
 using namespace marrow::test;
+using Eigen::Vector3d;
 
 /// A source that is 88 of the file's units from the origin: sqrt(2^2 + 8.9^2 + 87.53^2) = 88.004.
 const std::string kXmalab =
@@ -20,47 +20,37 @@ const std::string kDoubt =
 
 /// RTK's geometry with its lengths in mm, or in cm.
 std::string rtk(bool in_cm) {
-  const std::string zero = in_cm ? "" : "0";
-  return "<?xml version=\"1.0\"?>\n<!DOCTYPE RTKGEOMETRY>\n<RTKThreeDCircularGeometry version=\"3\">\n"
-         "<SourceToIsocenterDistance>100" +
-         zero +
-         "</SourceToIsocenterDistance>\n"
-         "<SourceToDetectorDistance>150" +
-         zero +
-         "</SourceToDetectorDistance>\n"
-         "<Projection><GantryAngle>30</GantryAngle><ProjectionOffsetX>2" +
-         zero +
-         "</ProjectionOffsetX></Projection>\n"
-         "</RTKThreeDCircularGeometry>\n";
+  const std::string in_mm =
+      rtk_geometry("<Projection><GantryAngle>30</GantryAngle><ProjectionOffsetX>20</ProjectionOffsetX></Projection>\n");
+  return in_cm ? with(with(with(in_mm, "1000", "100"), "1500", "150"), ">20<", ">2<") : in_mm;
 }
 
-class CameraScale : public testing::Test {
+class CameraScale : public InAFolder {
  protected:
   CameraScale() {
     put(folder / "cm.txt", kXmalab);
     const std::string pixels(64 * 48, '\1');
-    put(folder / "a.png", marrow::files::png_of(64, 48, 1, marrow::files::Sample::u8, pixels.data()));
+    put(folder / "a.png", files::png_of(64, 48, 1, files::Sample::u8, pixels.data()));
   }
   /// What the node gives, and in `said` what it says.
   shipped::Outputs call(const std::string& node, const shipped::Options& options) {
-    marrow::Context::Hooks hooks;
+    shipped::Outputs outputs;
     said.clear();
-    hooks.log = [&](std::string_view text, marrow::LogLevel) { said += std::string(text) + "\n"; };
-    const shipped::Outputs outputs = shipped::call(node, {}, options, marrow::Context(hooks));
-    said = without_folder(said, folder.path());
+    for (const std::string& line :
+         said_by([&](const Context& context) { outputs = shipped::call(node, {}, options, context); }))
+      said += without_folder(line, folder.path()) + "\n";
     return outputs;
   }
   std::string at(const std::string& name) const { return (folder / name).string(); }
-  TemporaryFolder folder;
   std::string said;
-  const Eigen::Vector3d kInMm{20, -89, 875.3};
+  const Vector3d kInMm{20, -89, 875.3};
 };
 
 TEST_F(CameraScale, OfOneCamera) {
-  const auto as_mm = call("read.camera", {{"path", at("cm.txt")}}).at("camera").as<marrow::Camera>();
-  EXPECT_EQ(as_mm.camera_from_world.translation_mm, Eigen::Vector3d(2, -8.9, 87.53));
+  const auto as_mm = call("read.camera", {{"path", at("cm.txt")}}).at("camera").as<Camera>();
+  EXPECT_EQ(as_mm.camera_from_world.translation_mm, Vector3d(2, -8.9, 87.53));
   EXPECT_EQ(said, kDoubt);
-  const auto scaled = call("read.camera", {{"path", at("cm.txt")}, {"scale", 10.0}}).at("camera").as<marrow::Camera>();
+  const auto scaled = call("read.camera", {{"path", at("cm.txt")}, {"scale", 10.0}}).at("camera").as<Camera>();
   EXPECT_LT((scaled.camera_from_world.translation_mm - kInMm).norm(), 1e-12);
   EXPECT_EQ(scaled.intrinsics, as_mm.intrinsics);
   EXPECT_EQ(said, "");
@@ -95,14 +85,14 @@ TEST_F(CameraScale, OfViews) {
   EXPECT_EQ(said, "view 'ap': " + kDoubt);
   shipped::Options scaled = one;
   scaled["scale"] = 10.0;
-  const auto view = call("read.view", scaled).at("view").as<marrow::View>();
+  const auto view = call("read.view", scaled).at("view").as<View>();
   EXPECT_LT((view.camera.camera_from_world.translation_mm - kInMm).norm(), 1e-12);
   EXPECT_EQ(said, "");
   const shipped::Options all = {{"names", std::vector<std::string>{"ap"}},
                                 {"images", std::vector<std::string>{at("a.png")}},
                                 {"cameras", std::vector<std::string>{at("cm.txt")}},
                                 {"scale", 10.0}};
-  const auto views = call("read.views", all).at("views").as_list<marrow::View>();
+  const auto views = call("read.views", all).at("views").as_list<View>();
   EXPECT_LT((views[0].camera.camera_from_world.translation_mm - kInMm).norm(), 1e-12);
   EXPECT_EQ(said, "");
   call("read.sequence", {{"names", std::vector<std::string>{"ap"}},
@@ -127,7 +117,7 @@ TEST_F(CameraScale, OfACase) {
   call("read.case", {{"path", at("case")}});
   EXPECT_EQ(said, "/case" + kDoubt);
   put(folder / "case/case.yaml", text("{file: cm.txt, scale: 10}"));
-  const auto views = call("read.case", {{"path", at("case")}}).at("views").as_list<marrow::View>();
+  const auto views = call("read.case", {{"path", at("case")}}).at("views").as_list<View>();
   EXPECT_LT((views[0].camera.camera_from_world.translation_mm - kInMm).norm(), 1e-12);
   EXPECT_EQ(said, "");
   put(folder / "case/case.yaml", text("{file: cm.txt, scale: 0}"));
@@ -144,14 +134,14 @@ TEST_F(CameraScale, OfAGeometryWhoseOptionsAreInMm) {
                               {"corner_mm", std::vector<double>{-15, -10}},
                               {"mirror", "upside_down"}};
   options["path"] = at("mm.xml");
-  const auto in_mm = call("read.cameras", options).at("cameras").as_list<marrow::Camera>()[0];
+  const auto in_mm = call("read.cameras", options).at("cameras").as_list<Camera>()[0];
   options["path"] = at("cm.xml");
   call("read.cameras", options);
   EXPECT_EQ(said,
             "view 'ap': /cm.xml: the X-ray source is 100 mm from the world's origin, where devices have 200 to 5000; "
             "looks like cm: give scale: 10\n");
   options["scale"] = 10.0;
-  const auto scaled = call("read.cameras", options).at("cameras").as_list<marrow::Camera>()[0];
+  const auto scaled = call("read.cameras", options).at("cameras").as_list<Camera>()[0];
   EXPECT_LT((scaled.intrinsics - in_mm.intrinsics).norm(), 1e-9);
   EXPECT_LT((scaled.camera_from_world.translation_mm - in_mm.camera_from_world.translation_mm).norm(), 1e-9);
   EXPECT_EQ(said, "");
@@ -165,7 +155,7 @@ TEST_F(CameraScale, IsRefusedForCamerasInMm) {
   EXPECT_EQ(
       without_folder(shipped::refusal("read.camera", {}, {{"path", at("own.yaml")}, {"scale", 10.0}}), folder.path()),
       "/own.yaml: scale is not for marrow's cameras, whose lengths are in mm; leave it out");
-  const marrow::Camera any{64, 48, Eigen::Vector3d(300, 300, 1).asDiagonal(), {"camera", "world"}};
+  const Camera any{64, 48, Vector3d(300, 300, 1).asDiagonal(), {"camera", "world"}};
   EXPECT_EQ(
       shipped::refusal("read.view", {{"camera", shipped::item(any)}},
                        {{"name", "ap"}, {"image", at("a.png")}, {"scale", 10.0}}),

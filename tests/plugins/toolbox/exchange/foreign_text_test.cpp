@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Texts as programs of other systems store them: with a byte order mark, in UTF-16, with carriage returns as line ends.
 // The value must be that of the same text in plain UTF-8 with line feeds, which the other tests of each reader check.
-#include <gtest/gtest.h>
-
 #include "marrow/base/hash.hpp"
 #include "marrow/toolbox/exchange/written_files.hpp"
 #include "marrow/toolbox/files/volume_file.hpp"
@@ -12,9 +10,11 @@
 
 namespace foreign_text_test {
 
+using namespace marrow;
 using namespace marrow::test;
-using marrow::hash_of;
+using Eigen::Vector3d;
 using Path = std::filesystem::path;
+using ForeignTexts = InAFolder;
 
 /// By hand: in UTF-16 an ASCII character is its byte and a zero, in the order that the first two bytes show.
 std::string utf16(const std::string& ascii, bool big_endian) {
@@ -34,38 +34,38 @@ std::vector<std::string> stored_otherwise(const std::string& text) {
 }
 
 template <class T>
-marrow::Digest read_one(const std::string& node, const Path& path, const shipped::Options& options = {}) {
+Digest read_one(const std::string& node, const Path& path, const shipped::Options& options = {}) {
   return hash_of(read_by<T>(node, path, options));
 }
 template <class T>
-marrow::Digest read_list(const std::string& node, const Path& path) {
+Digest read_list(const std::string& node, const Path& path) {
   return hash_of(shipped::call(node, {}, {{"path", path.string()}}).begin()->second.as_list<T>()[0]);
 }
-marrow::Digest landmarks(const Path& path) { return read_list<marrow::Landmarks>("read.landmarks", path); }
-marrow::Digest seeds(const Path& path) { return read_list<marrow::Seeds>("read.seeds", path); }
-marrow::Digest camera(const Path& path) { return read_one<marrow::Camera>("read.camera", path); }
-marrow::Digest pose(const Path& path) { return read_one<marrow::Pose>("read.pose", path); }
-marrow::Digest mesh(const Path& path) { return read_one<marrow::Mesh>("read.mesh", path); }
-marrow::Digest track(const Path& path) {
-  return hash_of(shipped::call("read.tra", {}, {{"path", path.string()}}).at("poses").as_list<marrow::Pose>()[1]);
+Digest landmarks(const Path& path) { return read_list<Landmarks>("read.landmarks", path); }
+Digest seeds(const Path& path) { return read_list<Seeds>("read.seeds", path); }
+Digest camera(const Path& path) { return read_one<Camera>("read.camera", path); }
+Digest pose(const Path& path) { return read_one<Pose>("read.pose", path); }
+Digest mesh(const Path& path) { return read_one<Mesh>("read.mesh", path); }
+Digest track(const Path& path) {
+  return hash_of(shipped::call("read.tra", {}, {{"path", path.string()}}).at("poses").as_list<Pose>()[1]);
 }
-marrow::Digest folder_of_volume(const Path& path) {
+Digest folder_of_volume(const Path& path) {
   put(path.parent_path() / "a.raw", std::string("\0\1\2\3\4\5\6\7", 8));
-  return hash_of(marrow::files::read_volume_file(path.parent_path(), {}));
+  return hash_of(files::read_volume_file(path.parent_path(), {}));
 }
-marrow::Digest plastimatch(const Path& path) {
-  return read_one<marrow::Camera>("read.camera", path, {{"image_size_px", std::vector<double>{64, 48}}});
+Digest plastimatch(const Path& path) {
+  return read_one<Camera>("read.camera", path, {{"image_size_px", std::vector<double>{64, 48}}});
 }
-marrow::Digest rtk(const Path& path) {
-  return read_one<marrow::Camera>("read.camera", path,
-                                  {{"image_size_px", std::vector<double>{64, 48}},
-                                   {"pixel_mm", std::vector<double>{0.5}},
-                                   {"mirror", "upside_down"}});
+Digest rtk(const Path& path) {
+  return read_one<Camera>("read.camera", path,
+                          {{"image_size_px", std::vector<double>{64, 48}},
+                           {"pixel_mm", std::vector<double>{0.5}},
+                           {"mirror", "upside_down"}});
 }
 
 struct Case {
   const char* name;
-  marrow::Digest (*read)(const Path&);
+  Digest (*read)(const Path&);
   std::string text;
 };
 
@@ -109,16 +109,15 @@ const Case kCases[] = {
      "ElementType = MET_UCHAR\nElementDataFile = a.raw\n"},
 };
 
-TEST(ForeignTexts, GiveTheValueOfThePlainText) {
-  const TemporaryFolder folder;
+TEST_F(ForeignTexts, GiveTheValueOfThePlainText) {
   for (const Case& one : kCases) {
     const Path path = folder / one.name;
     put(path, one.text);
-    const marrow::Digest expected = one.read(path);
+    const Digest expected = one.read(path);
     int number = 0;
     for (const std::string& stored : stored_otherwise(one.text)) {
       put(path, stored);
-      marrow::Digest read;
+      Digest read;
       EXPECT_NO_THROW(read = one.read(path))
           << one.name << " " << number << ": " << message_of([&] { one.read(path); });
       EXPECT_EQ(read, expected) << one.name << ", stored in way " << number;
@@ -128,19 +127,18 @@ TEST(ForeignTexts, GiveTheValueOfThePlainText) {
 }
 
 // A script of a person in Germany may have called locale.setlocale(). What is written and read must stay the same.
-TEST(ForeignTexts, TheLocaleOfTheProcessDoesNotCount) {
-  const TemporaryFolder folder;
-  std::vector<marrow::Digest> before;
+TEST_F(ForeignTexts, TheLocaleOfTheProcessDoesNotCount) {
+  std::vector<Digest> before;
   for (const Case& one : kCases) {
     put(folder / one.name, one.text);
     before.push_back(one.read(folder / one.name));
   }
-  const marrow::Camera camera = read_by<marrow::Camera>("read.camera", folder / "cam.txt");
-  const marrow::Pose pose = read_by<marrow::Pose>("read.pose", folder / "pose.tfm");
-  const marrow::Mesh mesh = read_by<marrow::Mesh>("read.mesh", folder / "m.obj");
-  const marrow::Seeds seeds{"distal", {{0.5, 1.25, -3.75}}, true};
+  const Camera camera = read_by<Camera>("read.camera", folder / "cam.txt");
+  const Pose pose = read_by<Pose>("read.pose", folder / "pose.tfm");
+  const Mesh mesh = read_by<Mesh>("read.mesh", folder / "m.obj");
+  const Seeds seeds{"distal", {{0.5, 1.25, -3.75}}, true};
   const auto written = [&] {
-    using namespace marrow::exchange;
+    using namespace exchange;
     const shipped::Options pixel{{"pixel_mm", std::vector<double>{0.5}}};
     std::string all = written_by<FcsvFile>("write.fcsv", "seeds", seeds, folder / "o.fcsv");
     all += written_by<MarkupsFile>("write.markups", "seeds", seeds, folder / "o.mrk.json");
@@ -159,8 +157,7 @@ TEST(ForeignTexts, TheLocaleOfTheProcessDoesNotCount) {
 }
 
 // Lines in messages are those that an editor shows.
-TEST(ForeignTexts, FaultsAreNamedAtTheirLine) {
-  const TemporaryFolder folder;
+TEST_F(ForeignTexts, FaultsAreNamedAtTheirLine) {
   put(folder / "a.tra", utf16("1,0,0,1,0,1,0,2,0,0,1,3,0,0,0,1\r\n1,0,0\r\n", false));
   EXPECT_SAYS(track(folder / "a.tra"), "a.tra:2: expected the 16 numbers of a 4x4 matrix, got 3");
   put(folder / "a.yaml", "marrow-pose: 1\rtarget: world\rsource: world\r");
@@ -168,28 +165,26 @@ TEST(ForeignTexts, FaultsAreNamedAtTheirLine) {
 }
 
 // Files that were refused, or read as if the first line were a word of its own. The values are those written in them.
-TEST(ForeignTexts, FilesOfOthersWithAByteOrderMark) {
+TEST_F(ForeignTexts, FilesOfOthersWithAByteOrderMark) {
   MARROW_NEED_DATA(data, "strangers/text/bom");
   const auto named = [](const Path& path) {
-    return shipped::call("read.landmarks", {}, {{"path", path.string()}}).at("landmarks").as_list<marrow::Landmarks>();
+    return shipped::call("read.landmarks", {}, {{"path", path.string()}}).at("landmarks").as_list<Landmarks>();
   };
-  EXPECT_EQ(named(data / "points.fcsv")[0].points.at(1).model_mm, Eigen::Vector3d(4, 5, 6));
+  EXPECT_EQ(named(data / "points.fcsv")[0].points.at(1).model_mm, Vector3d(4, 5, 6));
   EXPECT_EQ(named(data / "points.mrk.json")[0].points.at(0).name, "A");
-  EXPECT_EQ(read_by<marrow::Camera>("read.camera", data / "cam.txt").intrinsics(0, 0), 3207.42975342);
-  EXPECT_EQ(read_by<marrow::Pose>("read.pose", data / "pose.yaml").world_from_model.translation_mm,
-            Eigen::Vector3d(4, 5, 6));
-  EXPECT_EQ(read_by<marrow::Pose>("read.pose", data / "pose.tfm").world_from_model.translation_mm,
-            Eigen::Vector3d(12, -14, 6));
+  EXPECT_EQ(read_by<Camera>("read.camera", data / "cam.txt").intrinsics(0, 0), 3207.42975342);
+  EXPECT_EQ(read_by<Pose>("read.pose", data / "pose.yaml").world_from_model.translation_mm, Vector3d(4, 5, 6));
+  EXPECT_EQ(read_by<Pose>("read.pose", data / "pose.tfm").world_from_model.translation_mm, Vector3d(12, -14, 6));
   const auto track = shipped::call("read.tra", {}, {{"path", (data / "track.tra").string()}});
-  EXPECT_EQ(track.at("poses").as_list<marrow::Pose>()[1].world_from_model.translation_mm, Eigen::Vector3d(1, 2, 4));
+  EXPECT_EQ(track.at("poses").as_list<Pose>()[1].world_from_model.translation_mm, Vector3d(1, 2, 4));
   for (const char* name : {"m.obj", "m.ply", "m.stl"}) EXPECT_NO_THROW(mesh(data / name)) << name;
-  EXPECT_NO_THROW(read_one<marrow::Camera>("read.camera", data / "g.xml",
-                                           {{"image_size_px", std::vector<double>{64, 48}},
-                                            {"pixel_mm", std::vector<double>{0.5}},
-                                            {"mirror", "upside_down"}}));
+  EXPECT_NO_THROW(read_one<Camera>("read.camera", data / "g.xml",
+                                   {{"image_size_px", std::vector<double>{64, 48}},
+                                    {"pixel_mm", std::vector<double>{0.5}},
+                                    {"mirror", "upside_down"}}));
   for (const char* name : {"v", "w"}) {
-    const marrow::Volume volume = marrow::files::read_volume_file(data / name, {});
-    EXPECT_EQ(volume.grid.origin_mm, Eigen::Vector3d(5, 6, 7)) << name;
+    const Volume volume = files::read_volume_file(data / name, {});
+    EXPECT_EQ(volume.grid.origin_mm, Vector3d(5, 6, 7)) << name;
     EXPECT_EQ(volume.values[7], 7) << name;
   }
 }

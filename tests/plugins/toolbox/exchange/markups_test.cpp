@@ -1,14 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <gtest/gtest.h>
-
 #include "marrow/toolbox/exchange/written_files.hpp"
 #include "tests/plugins/toolbox/exchange/values.hpp"
 
 namespace markups_test {
 
+using namespace marrow;
 using namespace marrow::test;
-using marrow::exchange::FcsvFile;
-using marrow::exchange::MarkupsFile;
+using Eigen::Vector3d;
+using exchange::FcsvFile;
+using exchange::MarkupsFile;
+using Markups = InAFolder;
 
 // As 3D Slicer 5 saves two points, shortened.
 const std::string kJson = R"({
@@ -50,33 +51,31 @@ const std::string kFcsv =
     "1,-53.388409961685827,73.5,0.25,0,0,0,1,1,1,0,distal-1,,,2,0\n"
     "2,40,-5,6,0,0,0,1,1,1,0,\"hip, \"\"left\"\"\",a text,\n";
 
-marrow::List<marrow::Landmarks> landmarks_at(const std::filesystem::path& path, shipped::Options options = {}) {
+List<Landmarks> landmarks_at(const std::filesystem::path& path, shipped::Options options = {}) {
   options["path"] = path.string();
-  return shipped::call("read.landmarks", {}, options).at("landmarks").as_list<marrow::Landmarks>();
+  return shipped::call("read.landmarks", {}, options).at("landmarks").as_list<Landmarks>();
 }
 
-marrow::List<marrow::Seeds> seeds_at(const std::filesystem::path& path, shipped::Options options = {}) {
+List<Seeds> seeds_at(const std::filesystem::path& path, shipped::Options options = {}) {
   options["path"] = path.string();
-  return shipped::call("read.seeds", {}, options).at("seeds").as_list<marrow::Seeds>();
+  return shipped::call("read.seeds", {}, options).at("seeds").as_list<Seeds>();
 }
 
-const Eigen::Vector3d kFirst(-53.388409961685827, 73.5, 0.25);
+const Vector3d kFirst(-53.388409961685827, 73.5, 0.25);
 
-TEST(Markups, JsonAsLandmarks) {
-  const TemporaryFolder folder;
+TEST_F(Markups, JsonAsLandmarks) {
   put(folder / "a.mrk.json", kJson);
   const auto landmarks = landmarks_at(folder / "a.mrk.json", {{"fragment", "distal"}});
   EXPECT_EQ(landmarks.names(), std::vector<std::string>{"distal"});
   ASSERT_EQ(landmarks[0].points.size(), 2u) << "the third is not placed";
   EXPECT_EQ(landmarks[0].points[0].name, "distal-1");
   EXPECT_EQ(landmarks[0].points[0].model_mm, kFirst);
-  EXPECT_EQ(landmarks[0].points[1].model_mm, Eigen::Vector3d(40, -5, 6));
+  EXPECT_EQ(landmarks[0].points[1].model_mm, Vector3d(40, -5, 6));
   EXPECT_TRUE(landmarks[0].seen.empty());
   EXPECT_EQ(landmarks_at(folder / "a.mrk.json").names(), std::vector<std::string>{"bone"});
 }
 
-TEST(Markups, FcsvAsLandmarks) {
-  const TemporaryFolder folder;
+TEST_F(Markups, FcsvAsLandmarks) {
   put(folder / "a.FCSV", kFcsv);
   const auto landmarks = landmarks_at(folder / "a.FCSV");
   ASSERT_EQ(landmarks[0].points.size(), 2u);
@@ -85,9 +84,8 @@ TEST(Markups, FcsvAsLandmarks) {
 }
 
 // RAS has the first two axes the other way round.
-TEST(Markups, RasBecomesLps) {
-  const TemporaryFolder folder;
-  const Eigen::Vector3d turned(53.388409961685827, -73.5, 0.25);
+TEST_F(Markups, RasBecomesLps) {
+  const Vector3d turned(53.388409961685827, -73.5, 0.25);
   put(folder / "a.mrk.json", with(kJson, "\"LPS\"", "\"RAS\""));
   EXPECT_EQ(landmarks_at(folder / "a.mrk.json")[0].points[0].model_mm, turned);
   for (const char* system : {"RAS", "0"}) {
@@ -98,115 +96,103 @@ TEST(Markups, RasBecomesLps) {
   EXPECT_EQ(landmarks_at(folder / "a.fcsv")[0].points[0].model_mm, kFirst);
 }
 
-TEST(Markups, LabelsOfSeedsNameTheirFragments) {
-  const TemporaryFolder folder;
+TEST_F(Markups, LabelsOfSeedsNameTheirFragments) {
   put(folder / "a.mrk.json", with(kJson, "distal-2", "proximal_7"));
   const auto seeds = seeds_at(folder / "a.mrk.json");
   EXPECT_EQ(seeds.names(), (std::vector<std::string>{"distal", "proximal"}));
   EXPECT_EQ(seeds[0].fragment, "distal");
   EXPECT_TRUE(seeds[0].wanted);
-  EXPECT_EQ(seeds[0].points_mm, std::vector<Eigen::Vector3d>{kFirst});
-  EXPECT_EQ(seeds[1].points_mm, (std::vector<Eigen::Vector3d>{{40, -5, 6}}));
+  EXPECT_EQ(seeds[0].points_mm, std::vector<Vector3d>{kFirst});
+  EXPECT_EQ(seeds[1].points_mm, (std::vector<Vector3d>{{40, -5, 6}}));
   const auto together = seeds_at(folder / "a.mrk.json", {{"fragment", "femur"}});
   EXPECT_EQ(together.names(), std::vector<std::string>{"femur"});
   EXPECT_EQ(together[0].points_mm.size(), 2u);
 }
 
-TEST(Markups, WhatIsWrittenIsReadBackExactly) {
-  const TemporaryFolder folder;
-  const marrow::Landmarks landmarks{{{"head", {1.0 / 3, -1e-7, 12345.678}},
-                                     {"comma, \"quote\"", {0.1, -0.2, 0.3}},
-                                     {"H\xc3\xbc"
-                                      "fte",
-                                      {4, 5, 6}}},
-                                    {},
-                                    {}};
-  const marrow::Seeds seeds{"distal part", {{1.0 / 7, 2, 3}, {-4, 5e-9, 6}}, true};
+TEST_F(Markups, WhatIsWrittenIsReadBackExactly) {
+  const Landmarks landmarks{{{"head", {1.0 / 3, -1e-7, 12345.678}},
+                             {"comma, \"quote\"", {0.1, -0.2, 0.3}},
+                             {"H\xc3\xbc"
+                              "fte",
+                              {4, 5, 6}}},
+                            {},
+                            {}};
+  const Seeds seeds{"distal part", {{1.0 / 7, 2, 3}, {-4, 5e-9, 6}}, true};
   written_by<MarkupsFile>("write.markups", "landmarks", landmarks, folder / "l.mrk.json");
   written_by<FcsvFile>("write.fcsv", "landmarks", landmarks, folder / "l.fcsv");
   written_by<MarkupsFile>("write.markups", "seeds", seeds, folder / "s.mrk.json");
   written_by<FcsvFile>("write.fcsv", "seeds", seeds, folder / "s.fcsv");
   for (const char* name : {"l.mrk.json", "l.fcsv"})
-    EXPECT_EQ(marrow::hash_of(landmarks_at(folder / name)[0]), marrow::hash_of(landmarks)) << name;
+    EXPECT_EQ(hash_of(landmarks_at(folder / name)[0]), hash_of(landmarks)) << name;
   for (const char* name : {"s.mrk.json", "s.fcsv"}) {
     const auto read = seeds_at(folder / name);
     ASSERT_EQ(read.names(), std::vector<std::string>{"distal part"}) << name;
-    EXPECT_EQ(marrow::hash_of(read[0]), marrow::hash_of(seeds)) << name;
+    EXPECT_EQ(hash_of(read[0]), hash_of(seeds)) << name;
   }
   EXPECT_CONTAINS(bytes_of(folder / "s.mrk.json"), "\"coordinateSystem\": \"LPS\"");
   EXPECT_CONTAINS(bytes_of(folder / "s.fcsv"), "# CoordinateSystem = LPS\n");
-  EXPECT_TRUE(shipped::declares("write.markups", marrow::exactly_one({"in.landmarks", "in.seeds"})));
+  EXPECT_TRUE(shipped::declares("write.markups", exactly_one({"in.landmarks", "in.seeds"})));
 }
 
-TEST(Markups, DiagnosesThatThereIsNothingToWrite) {
+TEST_F(Markups, DiagnosesThatThereIsNothingToWrite) {
   for (const char* node : {"write.markups", "write.fcsv"})
     EXPECT_EQ(shipped::refusal(node, {}), "the node that is wired to 'landmarks' or 'seeds' gave none");
 }
 
-TEST(Markups, DiagnosesFaultsOfJson) {
-  const TemporaryFolder folder;
-  const auto expect = [&](const std::string& text, const std::string& said) {
-    put(folder / "a.mrk.json", text);
-    EXPECT_REFUSED(landmarks_at(folder / "a.mrk.json"), "a.mrk.json", said);
-  };
-  expect(kJson.substr(0, kJson.find("4e1")),
-         "a.mrk.json:19: is no JSON from here on; it is cut off or damaged: save the markups again");
-  expect("[1]", "expected 3D Slicer's markups, got '[1]'");
-  expect(R"({"ROIs": []})", "markups: is missing; expected 3D Slicer's markups, saved as .mrk.json");
-  expect(R"({"markups": 3})", "markups: expected a list, got '3'");
-  expect(R"({"markups": []})", "markups: there is no point in it; place the points in 3D Slicer, and save");
-  expect(R"({"markups": [7]})", "markups[0]: expected an object, got '7'");
-  expect(R"({"markups": [{"controlPoints": [5]}]})", "markups[0].controlPoints[0]: expected an object, got '5'");
-  expect(R"({"markups": [{"controlPoints": {}}]})", "markups[0].controlPoints: expected a list, got '{}'");
-  expect(with(kJson, "schema-v1.0.3", "schema-v2.0.0"),
-         "@schema: expected a version 1 of 3D Slicer's markups, got 'http");
-  expect(with(kJson, "\"LPS\"", "\"IJK\""), "markups[0].coordinateSystem: expected LPS or RAS, got 'IJK'");
-  expect(with(kJson, "\"LPS\"", "1"), "markups[0].coordinateSystem: expected a text, got '1'");
-  expect(with(kJson, "\"mm\"", "\"um\""),
-         "markups[0].coordinateUnits: expected mm, got '\"um\"'; save the points in mm");
-  expect(with(kJson, "controlPoints", "points"), "markups[0].controlPoints: is missing; the list has no points; is it");
-  expect(with(kJson, "[4e1, -5, 6]", "[4e1, -5]"), "controlPoints[1].position: expected 3 coordinates, got 2");
-  expect(with(kJson, "4e1", "4e9"),
-         "markups[0].controlPoints[1].position[0]: expected a coordinate in mm of at most 1 km");
-  expect(with(kJson, "4e1", "4e999"),
-         "holds a number too large to be one; it is damaged: save the markups again in 3D");
-  expect(with(kJson, "4e1", "null"), "controlPoints[1].position[0]: expected a number, got 'null'");
-  expect(with(kJson, "4e1", "NaN"), "a.mrk.json:19: is no JSON from here on");
-  expect(with(kJson, "\"position\": [4e1", "\"place\": [4e1"),
-         "markups[0].controlPoints[1].position: is missing; each control point needs its three coordinates");
-  expect(with(kJson, "distal-2", "distal-1"), "point 2: its label 'distal-1' is that of point 1; give each its own");
-  expect(with(kJson, "distal-2", ""), "point 2: it has no label; give each point its landmark's name in 3D Slicer");
-  expect(with(kJson, "distal-2", "a\\nb"), "point 2: its label 'a\\x0ab'");
-  expect(std::string(200000, '['), "is no JSON from here on");
+TEST_F(Markups, DiagnosesFaultsOfJson) {
+  expect_faults(
+      folder / "a.mrk.json", kJson,
+      {{"", kJson.substr(0, kJson.find("4e1")),
+        "a.mrk.json:19: is no JSON from here on; it is cut off or damaged: save the markups again"},
+       {"", "[1]", "expected 3D Slicer's markups, got '[1]'"},
+       {"", R"({"ROIs": []})", "markups: is missing; expected 3D Slicer's markups, saved as .mrk.json"},
+       {"", R"({"markups": 3})", "markups: expected a list, got '3'"},
+       {"", R"({"markups": []})", "markups: there is no point in it; place the points in 3D Slicer, and save"},
+       {"", R"({"markups": [7]})", "markups[0]: expected an object, got '7'"},
+       {"", R"({"markups": [{"controlPoints": [5]}]})", "markups[0].controlPoints[0]: expected an object, got '5'"},
+       {"", R"({"markups": [{"controlPoints": {}}]})", "markups[0].controlPoints: expected a list, got '{}'"},
+       {"schema-v1.0.3", "schema-v2.0.0", "@schema: expected a version 1 of 3D Slicer's markups, got 'http"},
+       {"\"LPS\"", "\"IJK\"", "markups[0].coordinateSystem: expected LPS or RAS, got 'IJK'"},
+       {"\"LPS\"", "1", "markups[0].coordinateSystem: expected a text, got '1'"},
+       {"\"mm\"", "\"um\"", "markups[0].coordinateUnits: expected mm, got '\"um\"'; save the points in mm"},
+       {"controlPoints", "points", "markups[0].controlPoints: is missing; the list has no points; is it"},
+       {"[4e1, -5, 6]", "[4e1, -5]", "controlPoints[1].position: expected 3 coordinates, got 2"},
+       {"4e1", "4e9", "markups[0].controlPoints[1].position[0]: expected a coordinate in mm of at most 1 km"},
+       {"4e1", "4e999", "holds a number too large to be one; it is damaged: save the markups again in 3D"},
+       {"4e1", "null", "controlPoints[1].position[0]: expected a number, got 'null'"},
+       {"4e1", "NaN", "a.mrk.json:19: is no JSON from here on"},
+       {"\"position\": [4e1", "\"place\": [4e1",
+        "markups[0].controlPoints[1].position: is missing; each control point needs its three coordinates"},
+       {"distal-2", "distal-1", "point 2: its label 'distal-1' is that of point 1; give each its own"},
+       {"distal-2", "", "point 2: it has no label; give each point its landmark's name in 3D Slicer"},
+       {"distal-2", "a\\nb", "point 2: its label 'a\\x0ab'"},
+       {"", std::string(200000, '['), "is no JSON from here on"}},
+      [](const auto& path) { landmarks_at(path); });
 }
 
-TEST(Markups, DiagnosesFaultsOfFcsv) {
-  const TemporaryFolder folder;
-  const auto expect = [&](const std::string& text, const std::string& said) {
-    put(folder / "a.fcsv", text);
-    EXPECT_REFUSED(landmarks_at(folder / "a.fcsv"), "a.fcsv", said);
-  };
-  expect(with(kFcsv, "4.13", "3.6"), "a.fcsv:1: expected a version 4 or 5 of 3D Slicer's file, got '3.6'");
-  expect(with(kFcsv, "= LPS", "= 2"), "a.fcsv:2: expected the coordinate system LPS or RAS (also 1 or 0), got '2'");
-  expect(with(kFcsv, "# CoordinateSystem = LPS\n", ""),
-         "a.fcsv:3: no line '# CoordinateSystem = ' came before; add it, with LPS or RAS after the sign");
-  expect("1,2,3\n", "a.fcsv:1: expected 3D Slicer's '# Markups fiducial file version = ' first");
-  expect(with(kFcsv, ",label,", ",name,"), "a.fcsv:3: there is no column 'label'; expected id,x,y,z");
-  expect(with(kFcsv, "id,x,y", "id,y,x"), "a.fcsv:3: the columns x, y, z do not follow each other; expected id,x,y,z");
-  expect(with(kFcsv, "2,40,-5,6,0,0,0,1,1,1,0,", "2,40,-5,"), "a.fcsv:5: expected at least 12 cells, got 6");
-  expect(with(kFcsv, "2,40", "2,nan"), "a.fcsv:5: expected a coordinate in mm of at most 1 km, got 'nan'");
-  expect(with(kFcsv, "2,40", "2,4e7"), "a.fcsv:5: expected a coordinate in mm of at most 1 km, got '4e7'");
-  expect(with(kFcsv, "2,40", "2,4O"), "a.fcsv:5: expected a coordinate in mm of at most 1 km, got '4O'");
-  expect(with(kFcsv, "\"\"left\"\"\"", "left"),
-         "a.fcsv:5: a quotation mark is not closed; the file is cut off or damaged");
-  expect(kFcsv.substr(0, kFcsv.find("1,-53")), "there is no point in it; expected 3D Slicer's list of fiducials");
+TEST_F(Markups, DiagnosesFaultsOfFcsv) {
+  expect_faults(
+      folder / "a.fcsv", kFcsv,
+      {{"4.13", "3.6", "a.fcsv:1: expected a version 4 or 5 of 3D Slicer's file, got '3.6'"},
+       {"= LPS", "= 2", "a.fcsv:2: expected the coordinate system LPS or RAS (also 1 or 0), got '2'"},
+       {"# CoordinateSystem = LPS\n", "",
+        "a.fcsv:3: no line '# CoordinateSystem = ' came before; add it, with LPS or RAS after the sign"},
+       {"", "1,2,3\n", "a.fcsv:1: expected 3D Slicer's '# Markups fiducial file version = ' first"},
+       {",label,", ",name,", "a.fcsv:3: there is no column 'label'; expected id,x,y,z"},
+       {"id,x,y", "id,y,x", "a.fcsv:3: the columns x, y, z do not follow each other; expected id,x,y,z"},
+       {"2,40,-5,6,0,0,0,1,1,1,0,", "2,40,-5,", "a.fcsv:5: expected at least 12 cells, got 6"},
+       {"2,40", "2,nan", "a.fcsv:5: expected a coordinate in mm of at most 1 km, got 'nan'"},
+       {"2,40", "2,4e7", "a.fcsv:5: expected a coordinate in mm of at most 1 km, got '4e7'"},
+       {"2,40", "2,4O", "a.fcsv:5: expected a coordinate in mm of at most 1 km, got '4O'"},
+       {"\"\"left\"\"\"", "left", "a.fcsv:5: a quotation mark is not closed; the file is cut off or damaged"},
+       {"", kFcsv.substr(0, kFcsv.find("1,-53")), "there is no point in it; expected 3D Slicer's list of fiducials"}},
+      [](const auto& path) { landmarks_at(path); });
 }
 
 const std::string kHeader = kFcsv.substr(0, kFcsv.find("1,-53"));
 
 // 3D Slicer under a locale with decimal commas, and tables saved there: 12.5 becomes two cells, and what follows moves.
-TEST(Markups, DecimalCommasAreNoCells) {
-  const TemporaryFolder folder;
+TEST_F(Markups, DecimalCommasAreNoCells) {
   const auto expect = [&](const std::string& row, const std::string& said) {
     put(folder / "a.fcsv", kHeader + row + "\n");
     EXPECT_REFUSED(landmarks_at(folder / "a.fcsv"), "a.fcsv", said);
@@ -234,13 +220,12 @@ TEST(Markups, DecimalCommasAreNoCells) {
   expect("1,10,5,20,5,30,0,0,0,1,1,1,0,d-1,2,0", moved);
 }
 
-TEST(Markups, RowsOfOtherLengthsThatAreSound) {
-  const TemporaryFolder folder;
+TEST_F(Markups, RowsOfOtherLengthsThatAreSound) {
   const auto first_of = [&](const std::string& rows) {
     put(folder / "a.fcsv", kHeader + rows);
     return landmarks_at(folder / "a.fcsv")[0].points.at(0);
   };
-  const Eigen::Vector3d at(12.5, 30.1, -7.2);
+  const Vector3d at(12.5, 30.1, -7.2);
   for (const char* row : {"1,12.5,30.1,-7.2,0,0,0,1,1,1,0,notch,,,2,0", "1,12.5,30.1,-7.2,0,0,0,1,1,1,0,notch,,,,2,0",
                           "1,12.5,30.1,-7.2,0,0,0,1,1,1,0,1, , ,  2,0", "1,12.5,30.1,-7.2,0,0,0,1,1,1,0,notch",
                           "1,12.5,30.1,-7.2,0,0,0,1,1,1,0,notch,", "1,12.5,30.1,-7.2,0,0,0,1,1,1,0,7,,"})
@@ -255,15 +240,14 @@ TEST(Markups, RowsOfOtherLengthsThatAreSound) {
 }
 
 // The values are those of the files' texts.
-TEST(Markups, FilesOfOthersWithDecimalCommas) {
+TEST_F(Markups, FilesOfOthersWithDecimalCommas) {
   MARROW_NEED_DATA(data, "strangers/text");
   EXPECT_SAYS(seeds_at(data / "decimal_comma.fcsv"), "a number with a decimal comma makes two cells");
   EXPECT_SAYS(landmarks_at(data / "decimal_comma_one.fcsv"), "a number with a decimal comma makes two cells");
-  EXPECT_EQ(landmarks_at(data / "extra_cells.fcsv")[0].points.at(0).model_mm, Eigen::Vector3d(12.5, 30.1, -7.2));
+  EXPECT_EQ(landmarks_at(data / "extra_cells.fcsv")[0].points.at(0).model_mm, Vector3d(12.5, 30.1, -7.2));
 }
 
-TEST(Markups, DiagnosesSeedsWithoutAFragment) {
-  const TemporaryFolder folder;
+TEST_F(Markups, DiagnosesSeedsWithoutAFragment) {
   put(folder / "a.mrk.json", with(kJson, "distal-2", ""));
   EXPECT_SAYS(seeds_at(folder / "a.mrk.json"),
               "a.mrk.json: point 2: it has no label; give it its fragment's name in 3D Slicer, or give fragment");

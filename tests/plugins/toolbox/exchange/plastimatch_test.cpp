@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <gtest/gtest.h>
-
 #include <cstdlib>
 #include <cstring>
 #include <sstream>
@@ -10,60 +8,60 @@
 
 namespace plastimatch_test {
 
+using namespace marrow;
 using namespace marrow::test;
-using marrow::exchange::PlastimatchFile;
+using Eigen::Vector3d, Eigen::Vector2d;
+using exchange::PlastimatchFile;
+using Plastimatch = InAFolder;
 
-const std::filesystem::path kData = std::filesystem::path(MARROW_SOURCE_DIR) / "tests/plugins/toolbox/exchange/data";
-
-marrow::Camera read(const std::filesystem::path& path, std::vector<double> image_size_px = {120, 160}) {
-  return read_by<marrow::Camera>("read.camera", path, {{"image_size_px", std::move(image_size_px)}});
+Camera read(const std::filesystem::path& path, std::vector<double> image_size_px = {120, 160}) {
+  return read_by<Camera>("read.camera", path, {{"image_size_px", std::move(image_size_px)}});
 }
 
 // Written by: plastimatch drr --nrm "1 0 0" --vup "0 0 1" --sad 1000 --sid 1500 -r "120 160" -z "120 240" -c "50 70"
 // -o "0 0 0". The source is at x = 1000 mm, the detector at x = -500. Seen from the source with z up, y is to the
 // right. A pixel is 1 mm wide and 1.5 mm high.
-TEST(Plastimatch, PointsOfALateralViewByHand) {
-  const marrow::Camera camera = read(kData / "plastimatch-lateral.txt");
+TEST_F(Plastimatch, PointsOfALateralViewByHand) {
+  const Camera camera = read(kData / "plastimatch-lateral.txt");
   EXPECT_EQ(camera.width_px, 120);
   EXPECT_EQ(camera.height_px, 160);
-  EXPECT_LT((source_position_mm(camera) - Eigen::Vector3d(1000, 0, 0)).norm(), 1e-6);
-  EXPECT_LT((project(camera, {0, 0, 0}) - Eigen::Vector2d(50, 70)).norm(), 1e-6);
+  EXPECT_LT((source_position_mm(camera) - Vector3d(1000, 0, 0)).norm(), 1e-6);
+  EXPECT_LT((project(camera, {0, 0, 0}) - Vector2d(50, 70)).norm(), 1e-6);
   const double magnification = 1500.0 / 990;
-  const Eigen::Vector2d expected(50 - 6 * magnification, 70 - 8 * magnification / 1.5);
+  const Vector2d expected(50 - 6 * magnification, 70 - 8 * magnification / 1.5);
   EXPECT_LT((project(camera, {10, -6, 8}) - expected).norm(), 1e-5) << "the file has 9 digits";
 }
 
 // Written by: plastimatch drr -y 30 -r "100 120" -z "100 150" -o "1 2 3". The isocentre is seen in the middle.
-TEST(Plastimatch, TheIsocentreOfAnObliqueView) {
-  const marrow::Camera camera = read(kData / "plastimatch-oblique.txt", {100, 120});
-  EXPECT_LT((project(camera, {1, 2, 3}) - Eigen::Vector2d(49.5, 59.5)).norm(), 1e-5);
-  EXPECT_NEAR((source_position_mm(camera) - Eigen::Vector3d(1, 2, 3)).norm(), 1000, 1e-4);
+TEST_F(Plastimatch, TheIsocentreOfAnObliqueView) {
+  const Camera camera = read(kData / "plastimatch-oblique.txt", {100, 120});
+  EXPECT_LT((project(camera, {1, 2, 3}) - Vector2d(49.5, 59.5)).norm(), 1e-5);
+  EXPECT_NEAR((source_position_mm(camera) - Vector3d(1, 2, 3)).norm(), 1000, 1e-4);
 }
 
-TEST(Plastimatch, TheSizeMayComeFromTheImage) {
-  marrow::Image image;
+TEST_F(Plastimatch, TheSizeMayComeFromTheImage) {
+  Image image;
   image.pixels = cv::Mat(160, 120, CV_8U, cv::Scalar(0));
   const auto outputs = shipped::call("read.camera", {{"image", shipped::item(image)}},
                                      {{"path", (kData / "plastimatch-lateral.txt").string()}});
-  EXPECT_EQ(outputs.at("camera").as<marrow::Camera>().width_px, 120);
-  EXPECT_EQ(outputs.at("camera").as<marrow::Camera>().height_px, 160);
+  EXPECT_EQ(outputs.at("camera").as<Camera>().width_px, 120);
+  EXPECT_EQ(outputs.at("camera").as<Camera>().height_px, 160);
 }
 
-marrow::Camera oblique_camera() {
-  marrow::Camera camera{640, 480, {}, {"camera", "world"}};
+Camera oblique_camera() {
+  Camera camera{640, 480, {}, {"camera", "world"}};
   camera.intrinsics << 2500, 0, 300.25, 0, 2000, 251, 0, 0, 1;
-  camera.camera_from_world.rotation = marrow::rotation_from_vector({0.3, -0.5, 0.8});
+  camera.camera_from_world.rotation = rotation_from_vector({0.3, -0.5, 0.8});
   camera.camera_from_world.translation_mm = {10, -20, 700};
   return camera;
 }
 
-TEST(Plastimatch, WhatIsWrittenIsReadBack) {
-  const TemporaryFolder folder;
-  const marrow::Camera camera = oblique_camera();
+TEST_F(Plastimatch, WhatIsWrittenIsReadBack) {
+  const Camera camera = oblique_camera();
   const shipped::Options options = {{"pixel_mm", std::vector<double>{0.4, 0.5}}};
   const std::string bytes =
       written_by<PlastimatchFile>("write.plastimatch", "camera", camera, folder / "c.txt", options);
-  const marrow::Camera back = read(folder / "c.txt", {640, 480});
+  const Camera back = read(folder / "c.txt", {640, 480});
   EXPECT_EQ(back.camera_from_world.rotation, camera.camera_from_world.rotation);
   EXPECT_EQ(back.camera_from_world.translation_mm, camera.camera_from_world.translation_mm);
   EXPECT_LT((back.intrinsics - camera.intrinsics).cwiseAbs().maxCoeff(), 1e-11);
@@ -73,7 +71,7 @@ TEST(Plastimatch, WhatIsWrittenIsReadBack) {
   EXPECT_EQ(line[0], "300.25 251") << "the pixel that the central ray meets";
   EXPECT_EQ(line[4], "700") << "source to isocentre";
   EXPECT_EQ(line[5], "1000") << "source to detector: 2500 pixels of 0.4 mm, 2000 of 0.5 mm";
-  marrow::View view;
+  View view;
   view.camera = camera;
   EXPECT_EQ(written_by<PlastimatchFile>("write.plastimatch", "view", view, folder / "v.txt", options), bytes);
 }
@@ -93,9 +91,8 @@ cv::Mat1f read_pfm(const std::filesystem::path& path) {
 
 // The one test with plastimatch itself: it draws a ball of 8 mm, and the ball's shadow is where marrow's camera
 // projects the ball's centre. A pixel is not square, and the isocentre is not the origin.
-TEST(Plastimatch, ABallThatPlastimatchDrawsIsWhereMarrowProjectsIt) {
+TEST_F(Plastimatch, ABallThatPlastimatchDrawsIsWhereMarrowProjectsIt) {
   if (std::system("plastimatch --version > /dev/null 2>&1") != 0) GTEST_SKIP() << "not installed here: plastimatch";
-  const TemporaryFolder folder;
   const std::string quiet = " > " + (folder / "log").string() + " 2>&1";
   const std::string ball = (folder / "ball.mha").string();
   ASSERT_EQ(std::system(("plastimatch synth --pattern sphere --output " + ball +
@@ -104,7 +101,7 @@ TEST(Plastimatch, ABallThatPlastimatchDrawsIsWhereMarrowProjectsIt) {
                          quiet)
                             .c_str()),
             0);
-  const Eigen::Vector3d centre(10, -6, 8);
+  const Vector3d centre(10, -6, 8);
   double worst_px = 0;
   for (const char* view : {"--nrm '1 0 0' --vup '0 0 1' -o '0 0 0'", "--nrm '0 -1 0' --vup '0 0 1' -o '3 -5 7'",
                            "--nrm '0.6 0 0.8' --vup '0 1 0' -o '5 5 5'", "--nrm '2 3 -4' --vup '1 0 0' -o '-4 2 9'"}) {
@@ -118,11 +115,11 @@ TEST(Plastimatch, ABallThatPlastimatchDrawsIsWhereMarrowProjectsIt) {
     ASSERT_EQ(image.cols, 240);
     ASSERT_EQ(image.rows, 200);
     double weight = 0;
-    Eigen::Vector2d shadow = Eigen::Vector2d::Zero();
+    Vector2d shadow = Vector2d::Zero();
     for (int v = 0; v < image.rows; ++v)
       for (int u = 0; u < image.cols; ++u) {
         weight += image(v, u);
-        shadow += double(image(v, u)) * Eigen::Vector2d(u, v);
+        shadow += double(image(v, u)) * Vector2d(u, v);
       }
     ASSERT_GT(weight, 0) << view;
     const double off_px = (project(read(folder / "drr0000.txt", {240, 200}), centre) - shadow / weight).norm();
@@ -132,22 +129,18 @@ TEST(Plastimatch, ABallThatPlastimatchDrawsIsWhereMarrowProjectsIt) {
   std::printf("the ball's shadow is at most %.3f px from where marrow projects its centre\n", worst_px);
 }
 
-TEST(Plastimatch, DiagnosesFaults) {
-  const TemporaryFolder folder;
+TEST_F(Plastimatch, DiagnosesFaults) {
   const std::string good = bytes_of(kData / "plastimatch-lateral.txt");
-  const auto expect = [&](const std::string& text, const std::string& said) {
-    put(folder / "c.txt", text);
-    EXPECT_REFUSED(read(folder / "c.txt"), "c.txt", said);
-  };
-  expect(good.substr(0, 200), "c.txt:4: expected a row of the projection matrix, 4 numbers, got '");
-  expect(good.substr(0, good.find("   -1.0000")),
-         "c.txt:7: expected the direction of the central ray, 3 numbers, got ''");
-  expect(with(good, "Extrinsic", "Exterior"), "c.txt:8: expected 'Extrinsic', got 'Exterior'; plastimatch drr writes");
-  expect(with(good, "1.00000000e+03", "nan"),
-         "c.txt:5: expected the distance of the isocentre from the source, 1 number");
-  expect(
-      with(good, "6.66666667e-01", "6.66666667e+99"),
-      "c.txt: row 2 of its matrix is not that of Intrinsic times Extrinsic; one of them was changed: write it again");
+  expect_faults(folder / "c.txt", good,
+                {{"", good.substr(0, 200), "c.txt:4: expected a row of the projection matrix, 4 numbers, got '"},
+                 {"", good.substr(0, good.find("   -1.0000")),
+                  "c.txt:7: expected the direction of the central ray, 3 numbers, got ''"},
+                 {"Extrinsic", "Exterior", "c.txt:8: expected 'Extrinsic', got 'Exterior'; plastimatch drr writes"},
+                 {"1.00000000e+03", "nan", "c.txt:5: expected the distance of the isocentre from the source, 1 number"},
+                 {"6.66666667e-01", "6.66666667e+99",
+                  "c.txt: row 2 of its matrix is not that of Intrinsic times Extrinsic; one of them was changed: write "
+                  "it again"}},
+                [](const auto& path) { read(path); });
   put(folder / "c.txt", good);
   EXPECT_REFUSED(read(folder / "c.txt", {}), "c.txt",
                  "does not say how many pixels the image has; wire the image, or give image_size_px: [width, height]");
@@ -173,8 +166,7 @@ TEST(Plastimatch, DiagnosesFaults) {
 }
 
 // A format would ignore an option that it does not need.
-TEST(Plastimatch, DiagnosesOptionsThatAFormatDoesNotNeed) {
-  const TemporaryFolder folder;
+TEST_F(Plastimatch, DiagnosesOptionsThatAFormatDoesNotNeed) {
   put(folder / "c.yaml", "marrow-camera: 1\n");
   put(folder / "c.xml", "<a/>");
   put(folder / "c.h5", "a");
@@ -190,14 +182,14 @@ TEST(Plastimatch, DiagnosesOptionsThatAFormatDoesNotNeed) {
   expect("c.h5", {"pixel_mm", std::vector<double>{1}}, "pixel_mm");
   expect("c.h5", {"corner_mm", std::vector<double>{0, 0}}, "corner_mm");
   expect("c.yaml", {"mirror", "upside_down"}, "mirror");
-  marrow::Image image;
+  Image image;
   image.pixels = cv::Mat(4, 4, CV_8U, cv::Scalar(0));
   EXPECT_CONTAINS(shipped::refusal("read.camera", {{"image", shipped::item(image)}},
                                    {{"path", (kData / "xreg-by-h5py.h5").string()}}),
                   "this camera is of images of 200 x 160 pixels, but the image has 4 x 4");
 }
 
-TEST(Plastimatch, DiagnosesThatThereIsNothingToWrite) {
+TEST_F(Plastimatch, DiagnosesThatThereIsNothingToWrite) {
   const shipped::Options options{{"pixel_mm", std::vector<double>{1}}};
   EXPECT_EQ(shipped::refusal("write.plastimatch", {}, options),
             "the node that is wired to 'camera' or 'view' gave none");
@@ -206,8 +198,7 @@ TEST(Plastimatch, DiagnosesThatThereIsNothingToWrite) {
 }
 
 // Here the matrix agrees with its factors.
-TEST(Plastimatch, DiagnosesFactorsThatAreNoCamera) {
-  const TemporaryFolder folder;
+TEST_F(Plastimatch, DiagnosesFactorsThatAreNoCamera) {
   const auto text = [](const char* matrix, const char* extrinsic, const char* intrinsic) {
     return "0 0\n" + std::string(matrix) + "1000\n1500\n0 0 1\nExtrinsic\n" + extrinsic + "0 0 0 1\nIntrinsic\n" +
            intrinsic;

@@ -1,28 +1,28 @@
 // SPDX-License-Identifier: Apache-2.0
 // Which side of a surface is out, as read.mesh finds it, and what it says where that is not certain.
-#include <gtest/gtest.h>
-
 #include "tests/plugins/toolbox/exchange/values.hpp"
 
 namespace surface_shape_test {
 
+using namespace marrow;
 using namespace marrow::test;
 using Faces = std::vector<std::array<int, 3>>;
+using SurfaceShape = InAFolder;
 
 struct Read {
-  marrow::Mesh mesh;
+  Mesh mesh;
   std::vector<std::string> warnings;  ///< without the file's name
 };
 
 Read read(const std::filesystem::path& path, double scale = 1) {
   Read read;
-  marrow::Context::Hooks hooks;
-  hooks.log = [&](std::string_view text, marrow::LogLevel level) {
-    if (level != marrow::LogLevel::warning) return;
-    read.warnings.emplace_back(text);
-    if (read.warnings.back().rfind(path.string(), 0) == 0) read.warnings.back().erase(0, path.string().size());
-  };
-  read.mesh = read_by<marrow::Mesh>("read.mesh", path, {{"scale", scale}}, marrow::Context(hooks));
+  read.warnings = said_by(
+      [&](const Context& context) {
+        read.mesh = read_by<Mesh>("read.mesh", path, {{"scale", scale}}, context);
+      },
+      LogLevel::warning);
+  for (std::string& line : read.warnings)
+    if (line.starts_with(path.string())) line.erase(0, path.string().size());
   return read;
 }
 
@@ -56,7 +56,7 @@ std::string all(const Read& read) {
 }
 
 // A cube of 10 mm: 1000 mm3.
-TEST(SurfaceShape, ACubeThatFacesInwardsIsTurned) {
+TEST_F(SurfaceShape, ACubeThatFacesInwardsIsTurned) {
   const Read out = of(cube(3, 10, true)), in = of(cube(3, 10, false));
   EXPECT_EQ(all(out), "");
   EXPECT_NEAR(enclosed_volume_mm3(out.mesh), 1000, 1e-9);
@@ -67,7 +67,7 @@ TEST(SurfaceShape, ACubeThatFacesInwardsIsTurned) {
 }
 
 // VTK's mass of the file is -31510.4958540 mm3, and no edge belongs to one triangle only.
-TEST(SurfaceShape, ARealImplantThatFacesInwardsIsTurned) {
+TEST_F(SurfaceShape, ARealImplantThatFacesInwardsIsTurned) {
   MARROW_NEED_DATA(path, "implants/inside_out/KR_right_7_fem.stl");
   const Read femoral = read(path);
   EXPECT_NEAR(enclosed_volume_mm3(femoral.mesh), 31510.49585, 1e-3);
@@ -76,7 +76,7 @@ TEST(SurfaceShape, ARealImplantThatFacesInwardsIsTurned) {
                   ": all its triangles faced inwards (enclosed volume -31510.5 mm3), so they were turned");
 }
 
-TEST(SurfaceShape, RealBonesAreLeftAsTheyAre) {
+TEST_F(SurfaceShape, RealBonesAreLeftAsTheyAre) {
   // By VTK: the volume in mm3.
   for (const auto& [name, volume_mm3] :
        {std::pair("femur/femur.stl", 399254.9131), {"radius_motion/0.stl", 23048.1194}}) {
@@ -88,7 +88,7 @@ TEST(SurfaceShape, RealBonesAreLeftAsTheyAre) {
 }
 
 // 20^3 - 6^3 = 7784 mm3.
-TEST(SurfaceShape, ACavityFacesInwardsAndIsRight) {
+TEST_F(SurfaceShape, ACavityFacesInwardsAndIsRight) {
   const Read hollow = of(cube(0, 20, true) + cube(7, 6, false, 8));
   EXPECT_EQ(all(hollow), "");
   EXPECT_NEAR(enclosed_volume_mm3(hollow.mesh), 7784, 1e-9);
@@ -98,7 +98,7 @@ TEST(SurfaceShape, ACavityFacesInwardsAndIsRight) {
 }
 
 // 20^3 + 6^3 = 8216 mm3, and once more 6^3.
-TEST(SurfaceShape, APartThatFacesInwardsBesideAnotherIsTurned) {
+TEST_F(SurfaceShape, APartThatFacesInwardsBesideAnotherIsTurned) {
   const std::string after =
       " closed parts faced inwards without being a cavity in another part, so they were turned; if the surface was "
       "mirrored on its way here, it is still a mirror image\n";
@@ -119,7 +119,7 @@ std::string without_last_face(std::string text) {
   return text;
 }
 
-TEST(SurfaceShape, AnOpenOneWarns) {
+TEST_F(SurfaceShape, AnOpenOneWarns) {
   const std::string advice = "; costs that need its outline or its inside may be wrong: repair it (MeshLab, Blender)\n";
   const std::string open =
       ": the surface has no certain inside; 3 edges belong to one triangle only, so the surface is open";
@@ -130,7 +130,7 @@ TEST(SurfaceShape, AnOpenOneWarns) {
             open + "; most of its triangles seem to face inwards: turn them" + advice);
 }
 
-TEST(SurfaceShape, TrianglesThatFaceDifferentSidesWarn) {
+TEST_F(SurfaceShape, TrianglesThatFaceDifferentSidesWarn) {
   const std::string turned = without_last_face(cube(3, 10, true)) + "f 4 8 5\n";  // the last face is 4 5 8
   EXPECT_CONTAINS(all(of(turned)),
                   ": the surface has no certain inside; 3 edges belong to two triangles that face "
@@ -141,7 +141,7 @@ TEST(SurfaceShape, TrianglesThatFaceDifferentSidesWarn) {
 }
 
 // Two cubes that share the cube from 15 to 20 mm.
-TEST(SurfaceShape, OneThatCrossesItselfWarns) {
+TEST_F(SurfaceShape, OneThatCrossesItselfWarns) {
   const Read crossing = of(cube(0, 20, true) + cube(15, 20.5, true, 8));
   ASSERT_EQ(crossing.warnings.size(), 1u) << all(crossing);
   EXPECT_EQ(crossing.warnings[0].rfind(": the surface crosses itself, first seen at (", 0), 0u) << all(crossing);
@@ -149,14 +149,13 @@ TEST(SurfaceShape, OneThatCrossesItselfWarns) {
   EXPECT_EQ(all(of(cube(0, 20, true) + cube(20, 20, true, 8))), "") << "they only touch";
 }
 
-TEST(SurfaceShape, AnImplantIsTurnedToo) {
-  const TemporaryFolder folder;
+TEST_F(SurfaceShape, AnImplantIsTurnedToo) {
   put(folder / "nail.obj", cube(0, 50, false));
   put(folder / "holes.yaml",
       "marrow-implant: 1\nholes: {a: {centre_mm: [1, 2, 3], axis: [1, 0, 0], diameter_mm: 5}}\n");
   const auto outputs = shipped::call(
       "read.implant", {}, {{"holes", (folder / "holes.yaml").string()}, {"surface", (folder / "nail.obj").string()}});
-  EXPECT_NEAR(enclosed_volume_mm3(outputs.at("mesh").as<marrow::Mesh>()), 125000, 1e-6);
+  EXPECT_NEAR(enclosed_volume_mm3(outputs.at("mesh").as<Mesh>()), 125000, 1e-6);
 }
 
 }  // namespace surface_shape_test

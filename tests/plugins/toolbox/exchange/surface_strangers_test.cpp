@@ -1,31 +1,36 @@
 // SPDX-License-Identifier: Apache-2.0
 // Surfaces as other programs write them: marks of the frame, and words in other letters, quotes and lines.
-#include <gtest/gtest.h>
-
 #include <algorithm>
 
+#include "tests/plugins/read/meshes.hpp"
 #include "tests/plugins/toolbox/exchange/values.hpp"
 
 namespace surface_strangers_test {
 
+using namespace marrow;
 using namespace marrow::test;
+using Eigen::Vector3d;
+using SurfaceFrames = InAFolder;
+using SurfaceStrangers = InAFolder;
 
-marrow::Mesh read(const std::filesystem::path& path, std::string* said = nullptr) {
-  marrow::Context::Hooks hooks;
-  if (said) hooks.log = [said](std::string_view text, marrow::LogLevel) { *said += std::string(text) + "\n"; };
-  return read_by<marrow::Mesh>("read.mesh", path, {}, marrow::Context(hooks));
+Mesh read(const std::filesystem::path& path, std::string* said = nullptr) {
+  Mesh mesh;
+  for (const std::string& line :
+       said_by([&](const Context& context) { mesh = read_by<Mesh>("read.mesh", path, {}, context); }))
+    if (said) *said += line + "\n";
+  return mesh;
 }
 
-std::vector<std::array<double, 3>> sorted_vertices(const marrow::Mesh& mesh) {
+std::vector<std::array<double, 3>> sorted_vertices(const Mesh& mesh) {
   std::vector<std::array<double, 3>> vertices;
-  for (const Eigen::Vector3d& v : mesh.vertices_mm) vertices.push_back({v.x() + 0.0, v.y() + 0.0, v.z() + 0.0});
+  for (const Vector3d& v : mesh.vertices_mm) vertices.push_back({v.x() + 0.0, v.y() + 0.0, v.z() + 0.0});
   std::sort(vertices.begin(), vertices.end());
   return vertices;
 }
 
 /// A tetrahedron with its corners at the origin and at 10, 20 and 30 mm along the axes: 10 * 20 * 30 / 6 = 1000 mm3,
 /// as VTK's readers give it for each of the files below.
-void expect_tetrahedron(const marrow::Mesh& mesh, const std::string& what, double sign = 1) {
+void expect_tetrahedron(const Mesh& mesh, const std::string& what, double sign = 1) {
   const std::vector<std::array<double, 3>> expected =
       sorted_vertices({{{0, 0, 0}, {sign * 10, 0, 0}, {0, sign * 20, 0}, {0, 0, 30}}, {}, "ct"});
   EXPECT_EQ(sorted_vertices(mesh), expected) << what;
@@ -33,40 +38,10 @@ void expect_tetrahedron(const marrow::Mesh& mesh, const std::string& what, doubl
   EXPECT_NEAR(enclosed_volume_mm3(mesh), 1000, 1e-9) << what;
 }
 
-const int kFaces[4][3] = {{0, 2, 1}, {0, 1, 3}, {1, 2, 3}, {2, 0, 3}};
-const float kCorners[4][3] = {{0, 0, 0}, {10, 0, 0}, {0, 20, 0}, {0, 0, 30}};
+const Sides kSides{10, 20, 30};
 
-std::string stl_text(const std::string& name = "bone") {
-  std::string text = "solid " + name + "\n";
-  for (const auto& face : kFaces) {
-    text += "  facet normal 0 0 0\n    outer loop\n";
-    for (const int corner : face)
-      text += "      vertex " + std::to_string(int(kCorners[corner][0])) + " " +
-              std::to_string(int(kCorners[corner][1])) + " " + std::to_string(int(kCorners[corner][2])) + "\n";
-    text += "    endloop\n  endfacet\n";
-  }
-  return text + "endsolid " + name + "\n";
-}
-
-std::string stl_binary(std::string header) {
-  header.resize(80);
-  const auto append = [&](const auto& value) { header.append(reinterpret_cast<const char*>(&value), sizeof value); };
-  append(std::uint32_t(4));
-  for (const auto& face : kFaces) {
-    for (int k = 0; k < 3; ++k) append(0.0f);
-    for (const int corner : face)
-      for (const float coordinate : kCorners[corner]) append(coordinate);
-    append(std::uint16_t(0));
-  }
-  return header;
-}
-
-std::string ply(const std::string& comments) {
-  return "ply\nformat ascii 1.0\n" + comments +
-         "element vertex 4\nproperty float x\nproperty float y\nproperty float z\nelement face 4\n"
-         "property list uchar int vertex_indices\nend_header\n0 0 0\n10 0 0\n0 20 0\n0 0 30\n3 0 2 1\n3 0 1 3\n"
-         "3 1 2 3\n3 2 0 3\n";
-}
+std::string ply(const std::string& comments) { return ply_text(comments, kSides); }
+std::string stl(const std::string& name = "bone") { return stl_text(name, kSides); }
 
 const std::string kObj = "v 0 0 0\nv 10 0 0\nv 0 20 0\nv 0 0 30\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n";
 
@@ -88,15 +63,14 @@ std::string upper(std::string text) {
   return text;
 }
 
-TEST(SurfaceFrames, AMarkOfRasTurnsEveryFormat) {
-  const TemporaryFolder folder;
+TEST_F(SurfaceFrames, AMarkOfRasTurnsEveryFormat) {
   const std::string slicer = "3D Slicer output. SPACE=";
   for (const bool is_ras : {true, false}) {
     const std::string mark = slicer + (is_ras ? "RAS" : "LPS");
-    put(folder / "binary.stl", stl_binary(mark));
-    put(folder / "solid.stl", stl_binary("solid " + mark));
-    put(folder / "text.stl", stl_text(mark));
-    put(folder / "title.stl", "# " + mark + "\n" + stl_text());
+    put(folder / "binary.stl", stl_binary(mark, kSides));
+    put(folder / "solid.stl", stl_binary("solid " + mark, kSides));
+    put(folder / "text.stl", stl(mark));
+    put(folder / "title.stl", "# " + mark + "\n" + stl());
     put(folder / "a.ply", ply("comment VTK generated PLY File\ncomment " + mark + "\n"));
     put(folder / "a.obj", "# " + mark + "\n" + kObj);
     put(folder / "a.vtp", vtp(is_ras ? "82 65 83 0" : "76 80 83 0"));
@@ -108,12 +82,11 @@ TEST(SurfaceFrames, AMarkOfRasTurnsEveryFormat) {
   }
 }
 
-TEST(SurfaceFrames, TheFirstMarkCountsAndAContradictionIsSaid) {
-  const TemporaryFolder folder;
+TEST_F(SurfaceFrames, TheFirstMarkCountsAndAContradictionIsSaid) {
   const std::string both = "SPACE=LPS\n# converted from SPACE=RAS\n";
   put(folder / "a.obj", "# " + both + kObj);
   put(folder / "a.ply", ply("comment SPACE=LPS\ncomment converted from SPACE=RAS\n"));
-  put(folder / "a.stl", stl_text("SPACE=LPS, converted from SPACE=RAS"));
+  put(folder / "a.stl", stl("SPACE=LPS, converted from SPACE=RAS"));
   for (const char* name : {"a.obj", "a.ply", "a.stl"}) {
     std::string said;
     expect_tetrahedron(read(folder / name, &said), name);
@@ -129,29 +102,28 @@ TEST(SurfaceFrames, TheFirstMarkCountsAndAContradictionIsSaid) {
 
 // By VTK and numpy: with x and y negated, the 456 vertices of each RAS file are those of LPS_bin.stl bit for bit, and
 // the volume is 348625.37686 mm3.
-TEST(SurfaceFrames, RealFilesOf3dSlicer) {
+TEST_F(SurfaceFrames, RealFilesOf3dSlicer) {
   MARROW_NEED_DATA(folder, "strangers/frames");
-  const marrow::Mesh lps = read(folder / "LPS_bin.stl");
+  const Mesh lps = read(folder / "LPS_bin.stl");
   EXPECT_EQ(lps.vertices_mm.size(), 456u);
   EXPECT_NEAR(enclosed_volume_mm3(lps), 348625.37686, 1e-4);
   for (const char* name : {"RAS_bin.stl", "RAS_txt.stl", "RAS_bin.ply", "RAS_txt.ply"}) {
-    const marrow::Mesh ras = read(folder / name);
+    const Mesh ras = read(folder / name);
     EXPECT_EQ(sorted_vertices(ras), sorted_vertices(lps)) << name;
     EXPECT_NEAR(enclosed_volume_mm3(ras), 348625.37686, 1e-4) << name;
   }
   expect_tetrahedron(read(folder / "o_spacelps_then_ras.obj"), "LPS first");
 }
 
-TEST(SurfaceStrangers, RealFilesThatVtkReads) {
+TEST_F(SurfaceStrangers, RealFilesThatVtkReads) {
   MARROW_NEED_DATA(folder, "strangers/meshes");
   for (const char* name :
        {"lead_newline.stl", "lead_space.stl", "title.stl", "upper.stl", "o_cont.obj", "x_single.vtp", "x_space.vtp"})
     expect_tetrahedron(read(folder / name), name);
 }
 
-TEST(SurfaceStrangers, StlTextInAnyLetters) {
-  const TemporaryFolder folder;
-  const std::string text = stl_text();
+TEST_F(SurfaceStrangers, StlTextInAnyLetters) {
+  const std::string text = stl();
   const std::pair<const char*, std::string> files[] = {
       {"a space", " " + text},
       {"an empty line", "\n\n" + text},
@@ -170,8 +142,7 @@ TEST(SurfaceStrangers, StlTextInAnyLetters) {
   EXPECT_SAYS(read(folder / "a.stl"), "'endsolid' is missing at its end; the file is cut off, or no STL");
 }
 
-TEST(SurfaceStrangers, PlyWithAnyLineEnds) {
-  const TemporaryFolder folder;
+TEST_F(SurfaceStrangers, PlyWithAnyLineEnds) {
   for (const char* end : {"\n", "\r\n", "\r"}) {
     put(folder / "a.ply", with_line_ends(ply("comment SPACE=RAS\n"), end));
     expect_tetrahedron(read(folder / "a.ply"), "PLY", -1);
@@ -180,8 +151,7 @@ TEST(SurfaceStrangers, PlyWithAnyLineEnds) {
   expect_tetrahedron(read(folder / "a.ply"), "a byte order mark");
 }
 
-TEST(SurfaceStrangers, ObjLinesThatGoOn) {
-  const TemporaryFolder folder;
+TEST_F(SurfaceStrangers, ObjLinesThatGoOn) {
   const std::string vertices = "v 0 0 0\nv 10 0 0\nv 0 20 0\nv 0 0 30\n", faces = "f 1 2 4\nf 2 3 4\nf 3 1 4\n";
   for (const std::string& text : {vertices + "f 1 3 \\\n2\n" + faces,
                                   "v 0 0 0\nv 10 \\\n  0 \\\n  0\nv 0 20 0\nv 0 0 30\nvn 0 \\\n0 1\nf 1 3 2\n" + faces,
@@ -198,8 +168,7 @@ TEST(SurfaceStrangers, ObjLinesThatGoOn) {
   EXPECT_SAYS(read(folder / "a.obj"), "a.obj:9: expected the numbers of vertices, got '\\'");
 }
 
-TEST(SurfaceStrangers, VtpWithAnyQuotesAndBlanks) {
-  const TemporaryFolder folder;
+TEST_F(SurfaceStrangers, VtpWithAnyQuotesAndBlanks) {
   for (const char* tag : {"<VTKFile type='PolyData' version='0.1'>", "<VTKFile version=\"0.1\" type = \"PolyData\">",
                           "<VTKFile header_type=\"UInt32\" version=\"0.1\"\n  type\t=\n'PolyData'>"}) {
     put(folder / "a.vtp", vtp("", tag));

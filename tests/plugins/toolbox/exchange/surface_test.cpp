@@ -1,17 +1,18 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <gtest/gtest.h>
-
 #include "marrow/toolbox/exchange/written_files.hpp"
 #include "tests/plugins/toolbox/exchange/values.hpp"
 
 namespace surface_test {
 
+using namespace marrow;
 using namespace marrow::test;
-using marrow::exchange::ObjFile;
-using marrow::exchange::VtpFile;
+using Eigen::Vector3d;
+using exchange::ObjFile;
+using exchange::VtpFile;
+using Surface = InAFolder;
 
-marrow::Mesh read(const std::filesystem::path& path, double scale = 1) {
-  return read_by<marrow::Mesh>("read.mesh", path, {{"scale", scale}});
+Mesh read(const std::filesystem::path& path, double scale = 1) {
+  return read_by<Mesh>("read.mesh", path, {{"scale", scale}});
 }
 
 /// A tetrahedron with corners at the origin and 1 along each axis: volume 1/6.
@@ -35,45 +36,41 @@ std::string marked(const std::string& numbers) {
                   numbers + "</Array></FieldData>\n");
 }
 
-void expect_tetrahedron(const marrow::Mesh& mesh, const std::string& what, double volume) {
+void expect_tetrahedron(const Mesh& mesh, const std::string& what, double volume) {
   EXPECT_EQ(mesh.vertices_mm.size(), 4u) << what;
   EXPECT_EQ(mesh.triangles.size(), 4u) << what;
   EXPECT_TRUE(is_closed(mesh)) << what;
   EXPECT_NEAR(enclosed_volume_mm3(mesh), volume, 1e-9) << what;
 }
 
-TEST(Surface, ObjAndVtp) {
-  const TemporaryFolder folder;
+TEST_F(Surface, ObjAndVtp) {
   put(folder / "a.obj", kObj);
   put(folder / "a.VTP", kVtp);
   for (const char* name : {"a.obj", "a.VTP"}) {
     expect_tetrahedron(read(folder / name), name, 1 / 6.0);
     expect_tetrahedron(read(folder / name, 10), name, 1000 / 6.0);
-    EXPECT_EQ(read(folder / name).vertices_mm[1], Eigen::Vector3d(1, 0, 0)) << name;
+    EXPECT_EQ(read(folder / name).vertices_mm[1], Vector3d(1, 0, 0)) << name;
   }
 }
 
-TEST(Surface, RasBecomesLpsAndStaysTheRightWayOut) {
-  const TemporaryFolder folder;
+TEST_F(Surface, RasBecomesLpsAndStaysTheRightWayOut) {
   put(folder / "a.obj", "# 3D Slicer output. SPACE=RAS\n" + kObj);
   put(folder / "a.vtp", marked("82 65 83 0"));
   for (const char* name : {"a.obj", "a.vtp"}) {
     expect_tetrahedron(read(folder / name), name, 1 / 6.0);
-    EXPECT_EQ(read(folder / name).vertices_mm[1], Eigen::Vector3d(-1, 0, 0)) << name;
-    EXPECT_EQ(read(folder / name).vertices_mm[3], Eigen::Vector3d(0, 0, 1)) << name;
+    EXPECT_EQ(read(folder / name).vertices_mm[1], Vector3d(-1, 0, 0)) << name;
+    EXPECT_EQ(read(folder / name).vertices_mm[3], Vector3d(0, 0, 1)) << name;
   }
   put(folder / "a.obj", "# 3D Slicer output. SPACE=LPS\n" + kObj);
   put(folder / "a.vtp", marked("76 80 83 0"));
-  for (const char* name : {"a.obj", "a.vtp"})
-    EXPECT_EQ(read(folder / name).vertices_mm[1], Eigen::Vector3d(1, 0, 0)) << name;
+  for (const char* name : {"a.obj", "a.vtp"}) EXPECT_EQ(read(folder / name).vertices_mm[1], Vector3d(1, 0, 0)) << name;
 }
 
-TEST(Surface, FacesOfMoreCornersBecomeTriangles) {
-  const TemporaryFolder folder;
+TEST_F(Surface, FacesOfMoreCornersBecomeTriangles) {
   std::string cube = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 0 0 1\nv 1 0 1\nv 1 1 1\nv 0 1 1\n";
   cube += "f 4 3 2 1\nf 5 6 7 8\nf 1 2 6 5\nf 2 3 7 6\nf 3 4 8 7\nf 4 1 5 8\n";
   put(folder / "a.obj", cube);
-  const marrow::Mesh mesh = read(folder / "a.obj");
+  const Mesh mesh = read(folder / "a.obj");
   EXPECT_EQ(mesh.triangles.size(), 12u);
   EXPECT_TRUE(is_closed(mesh));
   EXPECT_DOUBLE_EQ(enclosed_volume_mm3(mesh), 1);
@@ -81,91 +78,72 @@ TEST(Surface, FacesOfMoreCornersBecomeTriangles) {
   EXPECT_SAYS(read(folder / "b.obj"), "a face of 4 corners is far from convex or flat, or crosses itself");
 }
 
-TEST(Surface, WhatIsWrittenIsReadBackToTheLastBit) {
-  const TemporaryFolder folder;
-  const marrow::Mesh mesh{{{0, 0, 0}, {1.0 / 3, 0, 0}, {0, 1e-9, 0}, {0, 0, 12345.678}},
-                          {{0, 2, 1}, {0, 1, 3}, {0, 3, 2}, {1, 2, 3}},
-                          "ct"};
+TEST_F(Surface, WhatIsWrittenIsReadBackToTheLastBit) {
+  const Mesh mesh{{{0, 0, 0}, {1.0 / 3, 0, 0}, {0, 1e-9, 0}, {0, 0, 12345.678}},
+                  {{0, 2, 1}, {0, 1, 3}, {0, 3, 2}, {1, 2, 3}},
+                  "ct"};
   written_by<ObjFile>("write.obj", "mesh", mesh, folder / "a.obj");
   const std::string vtp = written_by<VtpFile>("write.vtp", "mesh", mesh, folder / "a.vtp");
-  EXPECT_EQ(marrow::hash_of(read(folder / "a.obj")), marrow::hash_of(mesh));
-  EXPECT_EQ(marrow::hash_of(read(folder / "a.vtp")), marrow::hash_of(mesh));
+  EXPECT_EQ(hash_of(read(folder / "a.obj")), hash_of(mesh));
+  EXPECT_EQ(hash_of(read(folder / "a.vtp")), hash_of(mesh));
   EXPECT_EQ(written_by<VtpFile>("write.vtp", "mesh", mesh, folder / "b.vtp"), vtp) << "the same bytes again";
-  marrow::Mesh odd = mesh;
+  Mesh odd = mesh;
   odd.frame = "ct\nv 7 7 7";
   written_by<ObjFile>("write.obj", "mesh", odd, folder / "a.obj");
   EXPECT_EQ(read(folder / "a.obj").vertices_mm.size(), 4u) << "the frame's name adds nothing";
 }
 
-TEST(Surface, DiagnosesFaultsOfObj) {
-  const TemporaryFolder folder;
-  const auto expect = [&](const std::string& text, const std::string& said) {
-    put(folder / "a.obj", text);
-    EXPECT_REFUSED(read(folder / "a.obj"), "a.obj", said);
-  };
-  expect(with(kObj, "f 1 3 2", "f 1 3 9"), "a.obj:12: the face names vertex 9; there are 4 before it, counted from 1");
-  expect(with(kObj, "f 1 3 2", "f 1 3 0"), "a.obj:12: the face names vertex 0; there are 4 before it, counted from 1");
-  expect(with(kObj, "f -3", "f -5"), "a.obj:15: the face names vertex -5; there are 4 before it, counted from 1");
-  expect(with(kObj, "f 1 3 2", "f 1 99999999999999999999 2"), "a.obj:12: expected the numbers of vertices, got '999");
-  expect(with(kObj, "f 1 3 2", "f 1 3"), "a.obj:12: a face needs at least 3 vertices, got 2");
-  expect(with(kObj, "v 0 1 0", "v 0 1"), "a.obj:6: a vertex needs three numbers 'v x y z', got ''");
-  expect(with(kObj, "v 0 1 0", "v 0 1 O"), "a.obj:6: a vertex needs three numbers 'v x y z', got 'O'");
-  expect(with(kObj, "s off", "w off"),
-         "a.obj:11: expected a line of an OBJ file, as 'v x y z' or 'f 1 2 3', got 'w off'");
-  expect(with(kObj, "v 0 1 0", "v 0 nan 0"), "a.obj");
-  expect(with(kObj, "v 0 1 0", "v 0 1e300 0"), "a.obj");
-  expect("v 0 0 0\n", "there is no face ('f 1 2 3') in it; it is cut off, or no OBJ");
+TEST_F(Surface, DiagnosesFaultsOfObj) {
+  expect_faults(folder / "a.obj", kObj,
+                {{"f 1 3 2", "f 1 3 9", "a.obj:12: the face names vertex 9; there are 4 before it, counted from 1"},
+                 {"f 1 3 2", "f 1 3 0", "a.obj:12: the face names vertex 0; there are 4 before it, counted from 1"},
+                 {"f -3", "f -5", "a.obj:15: the face names vertex -5; there are 4 before it, counted from 1"},
+                 {"f 1 3 2", "f 1 99999999999999999999 2", "a.obj:12: expected the numbers of vertices, got '999"},
+                 {"f 1 3 2", "f 1 3", "a.obj:12: a face needs at least 3 vertices, got 2"},
+                 {"v 0 1 0", "v 0 1", "a.obj:6: a vertex needs three numbers 'v x y z', got ''"},
+                 {"v 0 1 0", "v 0 1 O", "a.obj:6: a vertex needs three numbers 'v x y z', got 'O'"},
+                 {"s off", "w off", "a.obj:11: expected a line of an OBJ file, as 'v x y z' or 'f 1 2 3', got 'w off'"},
+                 {"v 0 1 0", "v 0 nan 0", "a.obj"},
+                 {"v 0 1 0", "v 0 1e300 0", "a.obj"},
+                 {"", "v 0 0 0\n", "there is no face ('f 1 2 3') in it; it is cut off, or no OBJ"}},
+                [](const auto& path) { read(path); });
   put(folder / "a.off", "OFF");
   EXPECT_SAYS(read(folder / "a.off"), "a.off: not a surface that can be read; known are .stl, .ply, .obj and .vtp");
 }
 
-TEST(Surface, DiagnosesFaultsOfVtp) {
-  const TemporaryFolder folder;
-  const auto expect = [&](const std::string& text, const std::string& said) {
-    put(folder / "a.vtp", text);
-    EXPECT_REFUSED(read(folder / "a.vtp"), "a.vtp", said);
-  };
-  expect("solid\n", "expected a surface of VTK in XML, with <VTKFile at its beginning; export it again as .vtp");
-  expect(with(kVtp, "\"PolyData\"", "\"ImageData\""), "its type is not PolyData, so it is no surface; export the");
-  expect(with(kVtp, "NumberOfPoints=\"4\"", "NumberOfPoints=\"4000000000\""),
-         "its NumberOfPoints is negative, or more than a file of 544 bytes can hold; it is damaged: export it again");
-  expect(with(kVtp, "NumberOfPoints=\"4\"", "NumberOfPoints = '4000000000'"),
-         "its NumberOfPoints is negative, or more than a file");
-  expect(with(kVtp, "NumberOfPolys=\"4\"", "NumberOfPolys=\"-4000000000\""),
-         "its NumberOfPolys is negative, or more than a file of ");
-  expect(with(kVtp, "NumberOfPolys=\"4\"", "NumberOfPolys=\"-4\""),
-         "its NumberOfPolys is negative, or more than a file of ");
-  expect(with(kVtp, "NumberOfComponents=\"3\"", "NumberOfComponents=\"-2147483648\""),
-         "its NumberOfComponents is negative, or more than a file of ");
-  expect(with(kVtp, "NumberOfPoints=\"4\"", "NumberOfPoints=\"-1\""), "its NumberOfPoints is negative, or more");
-  expect(with(with(kVtp, "NumberOfStrips=\"0\"", "NumberOfStrips=\"1\""), "<Polys>",
-              "<Strips><DataArray type=\"Int64\" Name=\"connectivity\" format=\"ascii\">0 1 2 3</DataArray>"
-              "<DataArray type=\"Int64\" Name=\"offsets\" format=\"ascii\">4</DataArray></Strips><Polys>"),
-         "has strips of triangles, which are not read; save it with polygons (VTK: vtkTriangleFilter)");
-  expect(kVtp.substr(0, 500), "VTK cannot read it (");
-  expect(with(kVtp, "0 2 1 0", "0 9 1 0"), "a face names point 9; there are 4, counted from 0");
-  expect(with(kVtp, "0 2 1 0", "0 -2 1 0"), "a face names point -2; there are 4, counted from 0");
-  expect(with(kVtp, "0 0 0 1 0 0 0 1 0 0 0 1", "0 0 0 1 0 0"), "a.vtp");
-  expect(with(kVtp, "0 0 0 1 0 0", "0 0 nan 1 0 0"), "a.vtp");
-  expect(with(kVtp, "NumberOfPolys=\"4\"", "NumberOfPolys=\"0\""),
-         "there is no polygon in it; export the surface again");
+TEST_F(Surface, DiagnosesFaultsOfVtp) {
+  expect_faults(
+      folder / "a.vtp", kVtp,
+      {{"", "solid\n", "expected a surface of VTK in XML, with <VTKFile at its beginning; export it again as .vtp"},
+       {"\"PolyData\"", "\"ImageData\"", "its type is not PolyData, so it is no surface; export the"},
+       {"NumberOfPoints=\"4\"", "NumberOfPoints=\"4000000000\"",
+        "its NumberOfPoints is negative, or more than a file of 544 bytes can hold; it is damaged: export it again"},
+       {"NumberOfPoints=\"4\"", "NumberOfPoints = '4000000000'", "its NumberOfPoints is negative, or more than a file"},
+       {"NumberOfPolys=\"4\"", "NumberOfPolys=\"-4000000000\"",
+        "its NumberOfPolys is negative, or more than a file of "},
+       {"NumberOfPolys=\"4\"", "NumberOfPolys=\"-4\"", "its NumberOfPolys is negative, or more than a file of "},
+       {"NumberOfComponents=\"3\"", "NumberOfComponents=\"-2147483648\"",
+        "its NumberOfComponents is negative, or more than a file of "},
+       {"NumberOfPoints=\"4\"", "NumberOfPoints=\"-1\"", "its NumberOfPoints is negative, or more"},
+       {"",
+        with(with(kVtp, "NumberOfStrips=\"0\"", "NumberOfStrips=\"1\""), "<Polys>",
+             "<Strips><DataArray type=\"Int64\" Name=\"connectivity\" format=\"ascii\">0 1 2 3</DataArray>"
+             "<DataArray type=\"Int64\" Name=\"offsets\" format=\"ascii\">4</DataArray></Strips><Polys>"),
+        "has strips of triangles, which are not read; save it with polygons (VTK: vtkTriangleFilter)"},
+       {"", kVtp.substr(0, 500), "VTK cannot read it ("},
+       {"0 2 1 0", "0 9 1 0", "a face names point 9; there are 4, counted from 0"},
+       {"0 2 1 0", "0 -2 1 0", "a face names point -2; there are 4, counted from 0"},
+       {"0 0 0 1 0 0 0 1 0 0 0 1", "0 0 0 1 0 0", "a.vtp"},
+       {"0 0 0 1 0 0", "0 0 nan 1 0 0", "a.vtp"},
+       {"NumberOfPolys=\"4\"", "NumberOfPolys=\"0\"", "there is no polygon in it; export the surface again"}},
+      [](const auto& path) { read(path); });
 }
 
-TEST(Surface, DamagedVtpFilesAreRefused) {
-  const TemporaryFolder folder;
-  const marrow::Mesh mesh{{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}}, {{0, 2, 1}, {0, 1, 3}, {0, 3, 2}, {1, 2, 3}}};
+TEST_F(Surface, DamagedVtpFilesAreRefused) {
+  const Mesh mesh{{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}}, {{0, 2, 1}, {0, 1, 3}, {0, 3, 2}, {1, 2, 3}}};
   const std::string bytes = written_by<VtpFile>("write.vtp", "mesh", mesh, folder / "good.vtp");
-  Sample sample{"a.vtp", bytes, bytes.size(), {}, true};
-  std::string said;
-  int refused = 0;
-  for (const Damaged& copy : damaged_copies(sample, 60, 200)) {
-    put(folder / "a.vtp", copy.bytes);
-    const Outcome outcome = outcome_of([&] { read(folder / "a.vtp"); }, "a.vtp", 256 << 20, said);
-    EXPECT_TRUE(outcome == Outcome::refused || outcome == Outcome::accepted)
-        << copy.how << ": " << name_of(outcome) << ": " << said;
-    refused += outcome == Outcome::refused;
-  }
-  EXPECT_GT(refused, 60);
+  expect_handled(folder, {"a.vtp", bytes, bytes.size(), {}, true}, [](const auto& path) { read(path); },
+                 {.cuts = 60, .changes = 200, .memory = 256 << 20, .least_refused = 60});
 }
 
 }  // namespace surface_test

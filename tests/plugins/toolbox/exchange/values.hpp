@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 // What the tests of other programs' formats share: nodes that read and write files, called as they are shipped.
-#include "tests/plugins/read/files.hpp"
-#include "tests/plugins/read/hostile.hpp"
+#include "tests/plugins/read/damage.hpp"
 #include "tests/plugins/read/reading.hpp"
 #include "tests/plugins/write/writing.hpp"
 
@@ -18,9 +17,15 @@ inline const std::filesystem::path kData =
 
 /// The text with other ends of its lines than \n.
 inline std::string with_line_ends(const std::string& text, const std::string& line_end) {
-  std::string result;
-  for (const char c : text) result += c == '\n' ? line_end : std::string(1, c);
-  return result;
+  return with_each(text, "\n", line_end);
+}
+
+/// RTK's geometry: 1000 mm from the source to the isocentre, 1500 mm to the detector.
+inline std::string rtk_geometry(const std::string& projections) {
+  return "<?xml version=\"1.0\"?>\n<!DOCTYPE RTKGEOMETRY>\n<RTKThreeDCircularGeometry version=\"3\">\n"
+         "  <SourceToIsocenterDistance>1000</SourceToIsocenterDistance>\n"
+         "  <SourceToDetectorDistance>1500</SourceToDetectorDistance>\n" +
+         projections + "</RTKThreeDCircularGeometry>\n";
 }
 
 /// Calls write.NODE with one input, writes what it gives by its writer, and returns the file's bytes.

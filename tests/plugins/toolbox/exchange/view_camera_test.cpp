@@ -1,33 +1,29 @@
 // SPDX-License-Identifier: Apache-2.0
 // Views whose cameras are in files of other programs: as read.view, read.views and read.case take them.
-#include <gtest/gtest.h>
-
 #include "marrow/toolbox/files/samples_out.hpp"
 #include "tests/plugins/toolbox/exchange/values.hpp"
 
 namespace view_camera_test {
 
+using namespace marrow;
 using namespace marrow::test;
+using Eigen::Vector3d;
 
-const std::filesystem::path kData = std::filesystem::path(MARROW_SOURCE_DIR) / "tests/plugins/toolbox/exchange/data";
 const std::filesystem::path kXreg = kData / "xreg-by-h5py.h5";  // three projections of 200 x 160 pixels
 
 /// The gantry at 0 and at 90 degrees.
-const char* kRtk =
-    "<?xml version=\"1.0\"?>\n<!DOCTYPE RTKGEOMETRY>\n<RTKThreeDCircularGeometry version=\"3\">\n"
-    "  <SourceToIsocenterDistance>1000</SourceToIsocenterDistance>\n"
-    "  <SourceToDetectorDistance>1500</SourceToDetectorDistance>\n"
+const std::string kRtk = rtk_geometry(
     "  <Projection><GantryAngle>0</GantryAngle></Projection>\n"
-    "  <Projection><GantryAngle>90</GantryAngle></Projection>\n</RTKThreeDCircularGeometry>\n";
+    "  <Projection><GantryAngle>90</GantryAngle></Projection>\n");
 
 /// An image whose first pixel only is 1.
 void put_image(const std::filesystem::path& path, int width_px, int height_px) {
   std::string pixels(std::size_t(width_px) * std::size_t(height_px), '\0');
   pixels[0] = 1;
-  put(path, marrow::files::png_of(width_px, height_px, 1, marrow::files::Sample::u8, pixels.data()));
+  put(path, files::png_of(width_px, height_px, 1, files::Sample::u8, pixels.data()));
 }
 
-class ViewCamera : public testing::Test {
+class ViewCamera : public InAFolder {
  protected:
   ViewCamera() { put(folder / "g.xml", kRtk); }
   shipped::Options with_image(const std::filesystem::path& camera, int width_px, int height_px,
@@ -37,22 +33,19 @@ class ViewCamera : public testing::Test {
     options["camera"] = camera.string();
     return options;
   }
-  static marrow::View view(const shipped::Options& options) {
-    return shipped::call("read.view", {}, options).at("view").as<marrow::View>();
+  static View view(const shipped::Options& options) {
+    return shipped::call("read.view", {}, options).at("view").as<View>();
   }
-  static marrow::Camera camera(const std::filesystem::path& path, const shipped::Options& options) {
-    return read_by<marrow::Camera>("read.camera", path, options);
+  static Camera camera(const std::filesystem::path& path, const shipped::Options& options) {
+    return read_by<Camera>("read.camera", path, options);
   }
-  static void expect_same(const marrow::Camera& a, const marrow::Camera& b) {
-    EXPECT_EQ(marrow::hash_of(a), marrow::hash_of(b));
-  }
+  static void expect_same(const Camera& a, const Camera& b) { EXPECT_EQ(hash_of(a), hash_of(b)); }
   const shipped::Options kRtkImage = {
       {"projection", 1LL}, {"pixel_mm", std::vector<double>{0.5}}, {"mirror", "upside_down"}};
-  TemporaryFolder folder;
 };
 
 TEST_F(ViewCamera, ImageAndCameraAreTurnedOverTogether) {
-  const marrow::View read = view(with_image(kXreg, 200, 160, {{"projection", 2LL}, {"mirror", "left_right"}}));
+  const View read = view(with_image(kXreg, 200, 160, {{"projection", 2LL}, {"mirror", "left_right"}}));
   EXPECT_EQ(read.image.pixels.at<std::uint8_t>(0, 199), 1);
   expect_same(read.camera, camera(kXreg, {{"projection", 2LL}, {"mirror", "left_right"}}));
 }
@@ -62,7 +55,7 @@ TEST_F(ViewCamera, TheImageSaysItsSize) {
               camera(kData / "plastimatch-lateral.txt", {{"image_size_px", std::vector<double>{120, 160}}}));
   shipped::Options sized = kRtkImage;
   sized["image_size_px"] = std::vector<double>{101, 81};
-  const marrow::View read = view(with_image(folder / "g.xml", 101, 81, kRtkImage));
+  const View read = view(with_image(folder / "g.xml", 101, 81, kRtkImage));
   EXPECT_EQ(read.image.pixels.at<std::uint8_t>(80, 0), 1);
   expect_same(read.camera, camera(folder / "g.xml", sized));
 }
@@ -76,7 +69,7 @@ TEST_F(ViewCamera, EachViewHasItsProjection) {
                                     {"projections", std::vector<double>{1, 0}},
                                     {"pixel_mm", std::vector<double>{0.5}},
                                     {"mirror", "upside_down"}};
-  const auto views = shipped::call("read.views", {}, options).at("views").as_list<marrow::View>();
+  const auto views = shipped::call("read.views", {}, options).at("views").as_list<View>();
   shipped::Options sized = kRtkImage;
   sized["image_size_px"] = std::vector<double>{101, 81};
   expect_same(views[0].camera, camera(folder / "g.xml", sized));
@@ -108,7 +101,7 @@ TEST_F(ViewCamera, WhatIsMissingOrTooMuchIsSaid) {
   EXPECT_CONTAINS(refusal(folder / "c.yaml", 4, 4, {{"projection", 0LL}}), "projection is not for this format");
   shipped::Options wired = with_image("", 4, 4, {{"projection", 0LL}, {"name", "ap"}});
   wired.erase("camera");
-  marrow::Camera any{4, 4, Eigen::Vector3d(10, 10, 1).asDiagonal(), {"camera", "world"}};
+  Camera any{4, 4, Vector3d(10, 10, 1).asDiagonal(), {"camera", "world"}};
   EXPECT_EQ(
       shipped::refusal("read.view", {{"camera", shipped::item(any)}}, wired),
       "view 'ap': its camera is wired; projection, pixel_mm, corner_mm and scale are for a camera file: leave them "
@@ -132,7 +125,7 @@ class CaseCamera : public ViewCamera {
     put(folder / "case.yaml", "marrow-case: 1\nct: ct.mha\nviews:\n  - name: ap\n    image: a.png\n    camera: " +
                                   camera + "\nfragments:\n  distal: {seeds: [[1, 1, 1]]}\n");
   }
-  marrow::View view_of_case(const std::string& camera, int width_px, int height_px) {
+  View view_of_case(const std::string& camera, int width_px, int height_px) {
     put_case(camera, width_px, height_px);
     return case_at(folder.path()).views[0];
   }
@@ -144,7 +137,7 @@ class CaseCamera : public ViewCamera {
 };
 
 TEST_F(CaseCamera, FilesOfOtherPrograms) {
-  const marrow::View read = view_of_case("{file: x.h5, projection: 1, mirror: left_right}", 200, 160);
+  const View read = view_of_case("{file: x.h5, projection: 1, mirror: left_right}", 200, 160);
   EXPECT_EQ(read.image.pixels.at<std::uint8_t>(0, 0), 1) << "the image of a case is turned over already";
   expect_same(read.camera, camera(kXreg, {{"projection", 1LL}, {"mirror", "left_right"}}));
   expect_same(view_of_case("p.txt", 120, 160).camera,

@@ -1,38 +1,37 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <gtest/gtest.h>
-
 #include "marrow/toolbox/exchange/written_files.hpp"
 #include "marrow/toolbox/exchange/xreg_file.hpp"
 #include "tests/plugins/toolbox/exchange/values.hpp"
 
 namespace xreg_test {
 
+using namespace marrow;
 using namespace marrow::test;
-using marrow::exchange::XregFile;
-using marrow::exchange::XregProjection;
+using Eigen::Vector3d, Eigen::Vector2d;
+using exchange::XregFile;
+using exchange::XregProjection;
+using Xreg = InAFolder;
 
 // Made with h5py as xReg lays its files out, with a projection in each of the three frames of cameras, images of 200 x
 // 160 pixels, f = 2000 px and pixels of 0.5 mm. The camera is 800 mm from the origin.
 const std::filesystem::path kFile = kData / "xreg-by-h5py.h5";
 
-marrow::Camera read(const std::filesystem::path& path, int projection, const std::string& mirror) {
-  return read_by<marrow::Camera>("read.camera", path, {{"projection", (long long)(projection)}, {"mirror", mirror}});
+Camera read(const std::filesystem::path& path, int projection, const std::string& mirror) {
+  return read_by<Camera>("read.camera", path, {{"projection", (long long)(projection)}, {"mirror", mirror}});
 }
 
 // In all three frames (10, -20, 0) is seen 2000 * 10 / 800 = 25 px right of the middle (99.5, 79.5) and 50 px above it.
-TEST(Xreg, PointsByHandInAllFrames) {
-  const Eigen::Vector3d point(10, -20, 0);
-  const marrow::Camera from_source = read(kFile, 0, "none");
+TEST_F(Xreg, PointsByHandInAllFrames) {
+  const Vector3d point(10, -20, 0);
+  const Camera from_source = read(kFile, 0, "none");
   EXPECT_EQ(from_source.width_px, 200);
   EXPECT_EQ(from_source.height_px, 160);
-  EXPECT_LT((project(from_source, point) - Eigen::Vector2d(124.5, 29.5)).norm(), 1e-9);
-  EXPECT_LT((source_position_mm(from_source) - Eigen::Vector3d(0, 0, -800)).norm(), 1e-9);
+  EXPECT_LT((project(from_source, point) - Vector2d(124.5, 29.5)).norm(), 1e-9);
+  EXPECT_LT((source_position_mm(from_source) - Vector3d(0, 0, -800)).norm(), 1e-9);
   for (const int projection : {1, 2}) {  // seen from the detector
-    EXPECT_LT((project(read(kFile, projection, "left_right"), point) - Eigen::Vector2d(199 - 124.5, 29.5)).norm(),
-              1e-9);
-    EXPECT_LT((project(read(kFile, projection, "upside_down"), point) - Eigen::Vector2d(124.5, 159 - 29.5)).norm(),
-              1e-9);
-    EXPECT_LT((source_position_mm(read(kFile, projection, "left_right")) - Eigen::Vector3d(0, 0, 800)).norm(), 1e-9);
+    EXPECT_LT((project(read(kFile, projection, "left_right"), point) - Vector2d(199 - 124.5, 29.5)).norm(), 1e-9);
+    EXPECT_LT((project(read(kFile, projection, "upside_down"), point) - Vector2d(124.5, 159 - 29.5)).norm(), 1e-9);
+    EXPECT_LT((source_position_mm(read(kFile, projection, "left_right")) - Vector3d(0, 0, 800)).norm(), 1e-9);
     EXPECT_SAYS(read(kFile, projection, "none"),
                 "its images are seen from the detector, or have their rows from below");
   }
@@ -41,21 +40,21 @@ TEST(Xreg, PointsByHandInAllFrames) {
   EXPECT_SAYS(read(kFile, 3, "none"), "has 3 projections, counted from 0; there is no projection 3");
 }
 
-marrow::List<marrow::Camera> cameras_at(const std::filesystem::path& path, shipped::Options options) {
+List<Camera> cameras_at(const std::filesystem::path& path, shipped::Options options) {
   options["path"] = path.string();
-  return shipped::call("read.cameras", {}, options).at("cameras").as_list<marrow::Camera>();
+  return shipped::call("read.cameras", {}, options).at("cameras").as_list<Camera>();
 }
 
-TEST(Xreg, SeveralProjectionsAtOnce) {
+TEST_F(Xreg, SeveralProjectionsAtOnce) {
   const shipped::Options both{{"names", std::vector<std::string>{"ap", "lateral"}},
                               {"projections", std::vector<double>{2, 1}},
                               {"mirror", "left_right"}};
   const auto cameras = cameras_at(kFile, both);
   EXPECT_EQ(cameras.names(), (std::vector<std::string>{"ap", "lateral"}));
-  EXPECT_EQ(marrow::hash_of(cameras[0]), marrow::hash_of(read(kFile, 2, "left_right")));
-  EXPECT_EQ(marrow::hash_of(cameras[1]), marrow::hash_of(read(kFile, 1, "left_right")));
+  EXPECT_EQ(hash_of(cameras[0]), hash_of(read(kFile, 2, "left_right")));
+  EXPECT_EQ(hash_of(cameras[1]), hash_of(read(kFile, 1, "left_right")));
   const auto first = cameras_at(kFile, {{"names", std::vector<std::string>{"ap"}}});
-  EXPECT_EQ(marrow::hash_of(first[0]), marrow::hash_of(read(kFile, 0, "none")));
+  EXPECT_EQ(hash_of(first[0]), hash_of(read(kFile, 0, "none")));
   const auto refusal = [&](const std::string& option, const shipped::Options::mapped_type& value) {
     shipped::Options options = both;
     options[option] = value;
@@ -71,9 +70,9 @@ TEST(Xreg, SeveralProjectionsAtOnce) {
                   "a.txt: expected RTK's geometry (.xml) or xReg's projection data (.h5)");
 }
 
-marrow::Landmarks landmarks_at(const std::filesystem::path& points, shipped::Options options) {
+Landmarks landmarks_at(const std::filesystem::path& points, shipped::Options options) {
   options["path"] = points.string();
-  return shipped::call("read.landmarks", {}, options).at("landmarks").as_list<marrow::Landmarks>()[0];
+  return shipped::call("read.landmarks", {}, options).at("landmarks").as_list<Landmarks>()[0];
 }
 
 const std::string kPoints =
@@ -81,19 +80,18 @@ const std::string kPoints =
     "# columns = id,x,y,z,ow,ox,oy,oz,vis,sel,lock,label,desc,associatedNodeID\n"
     ",1,2,3,0,0,0,1,1,1,0,FH-l,,\n,4,5,6,0,0,0,1,1,1,0,FH-r,,\n";
 
-TEST(Xreg, LandmarksAsImagesShowThem) {
-  const TemporaryFolder folder;
+TEST_F(Xreg, LandmarksAsImagesShowThem) {
   put(folder / "p.fcsv", kPoints);
   const std::vector<std::string> views{"ap", "lateral", "oblique"};
-  const marrow::Landmarks landmarks =
+  const Landmarks landmarks =
       landmarks_at(folder / "p.fcsv", {{"seen", kFile.string()}, {"names", views}, {"mirror", "left_right"}});
-  EXPECT_EQ(landmarks.points[0].model_mm, Eigen::Vector3d(-1, -2, 3));
+  EXPECT_EQ(landmarks.points[0].model_mm, Vector3d(-1, -2, 3));
   ASSERT_EQ(landmarks.seen.size(), 6u);
   EXPECT_EQ(landmarks.seen[3].name, "FH-r");
   EXPECT_EQ(landmarks.seen[3].view, "lateral");
-  EXPECT_EQ(landmarks.seen[3].pixel, Eigen::Vector2d(199 - 10.25, 20.5));
+  EXPECT_EQ(landmarks.seen[3].pixel, Vector2d(199 - 10.25, 20.5));
   EXPECT_EQ(landmarks_at(folder / "p.fcsv", {{"seen", kFile.string()}, {"names", views}}).seen[0].pixel,
-            Eigen::Vector2d(124.5, 29.5));
+            Vector2d(124.5, 29.5));
   EXPECT_SAYS(landmarks_at(folder / "p.fcsv", {{"seen", kFile.string()}}),
               "xreg-by-h5py.h5: has 3 projections; give as many names, got 0");
   put(folder / "p.fcsv", with(kPoints, "FH-r", "GSN-r"));
@@ -107,19 +105,19 @@ TEST(Xreg, LandmarksAsImagesShowThem) {
       "l.yaml: says itself where views show the landmarks; seen is only for points of 3D Slicer, so leave it out");
 }
 
-marrow::List<marrow::Camera> cameras() {
-  marrow::List<marrow::Camera> all;
+List<Camera> cameras() {
+  List<Camera> all;
   for (const char* name : {"frontal", "lateral"}) {
-    marrow::Camera camera{640, 480, {}, {"camera", "world"}};
+    Camera camera{640, 480, {}, {"camera", "world"}};
     camera.intrinsics << 2500, 0.25, 300.25, 0, 2000, 251, 0, 0, 1;
-    camera.camera_from_world.rotation = marrow::rotation_from_vector({0.3, -0.5, 0.8 + double(all.size())});
+    camera.camera_from_world.rotation = rotation_from_vector({0.3, -0.5, 0.8 + double(all.size())});
     camera.camera_from_world.translation_mm = {10, -20, 700};
     all.add(name, camera);
   }
   return all;
 }
 
-const marrow::Landmarks kLandmarks{{{"head", {1, 2, 3}}}, {{"head", "lateral", {100.25, 1.0 / 3}}}, {}};
+const Landmarks kLandmarks{{{"head", {1, 2, 3}}}, {{"head", "lateral", {100.25, 1.0 / 3}}}, {}};
 
 std::string write(const std::filesystem::path& path) {
   const auto outputs = shipped::call(
@@ -129,12 +127,10 @@ std::string write(const std::filesystem::path& path) {
   return bytes_of(path);
 }
 
-TEST(Xreg, WhatIsWrittenIsReadBackToTheLastBit) {
-  const TemporaryFolder folder;
+TEST_F(Xreg, WhatIsWrittenIsReadBackToTheLastBit) {
   const std::string bytes = write(folder / "a.h5");
-  for (int i = 0; i < 2; ++i)
-    EXPECT_EQ(marrow::hash_of(read(folder / "a.h5", i, "none")), marrow::hash_of(cameras()[std::size_t(i)]));
-  const std::vector<XregProjection> projections = marrow::exchange::read_xreg(folder / "a.h5");
+  for (int i = 0; i < 2; ++i) EXPECT_EQ(hash_of(read(folder / "a.h5", i, "none")), hash_of(cameras()[std::size_t(i)]));
+  const std::vector<XregProjection> projections = exchange::read_xreg(folder / "a.h5");
   EXPECT_TRUE(projections[0].landmarks.empty());
   ASSERT_EQ(projections[1].landmarks.size(), 1u);
   EXPECT_EQ(projections[1].landmarks[0].name, "head");
@@ -144,8 +140,8 @@ TEST(Xreg, WhatIsWrittenIsReadBackToTheLastBit) {
   EXPECT_EQ(write(folder / "b.h5"), bytes) << "the same bytes again";
 }
 
-TEST(Xreg, DiagnosesWhatCannotBeWritten) {
-  marrow::Landmarks landmarks = kLandmarks;
+TEST_F(Xreg, DiagnosesWhatCannotBeWritten) {
+  Landmarks landmarks = kLandmarks;
   const auto refusal = [&] {
     return shipped::refusal("write.xreg",
                             {{"cameras", shipped::list(cameras(), "view")}, {"landmarks", shipped::item(landmarks)}},
@@ -157,13 +153,12 @@ TEST(Xreg, DiagnosesWhatCannotBeWritten) {
   EXPECT_CONTAINS(refusal(), "landmark 'a/b': a file of xReg cannot hold a name with '/'; rename it");
 }
 
-TEST(Xreg, DiagnosesFaults) {
-  const TemporaryFolder folder;
-  const auto good = marrow::exchange::read_xreg(kFile);
+TEST_F(Xreg, DiagnosesFaults) {
+  const auto good = exchange::read_xreg(kFile);
   const auto expect = [&](const auto& change, const std::string& said) {
     std::vector<XregProjection> projections = good;
     change(projections[0]);
-    put(folder / "a.h5", marrow::exchange::xreg_bytes(projections));
+    put(folder / "a.h5", exchange::xreg_bytes(projections));
     EXPECT_REFUSED(read(folder / "a.h5", 0, "none"), "a.h5", said);
   };
   using P = XregProjection;
@@ -188,7 +183,7 @@ TEST(Xreg, DiagnosesFaults) {
   put(folder / "a.h5", "no HDF5");
   EXPECT_REFUSED(read(folder / "a.h5", 0, "none"), "a.h5",
                  "is no HDF5 file that can be opened; it is cut off, damaged or");
-  put(folder / "a.h5", marrow::exchange::xreg_bytes({}));
+  put(folder / "a.h5", exchange::xreg_bytes({}));
   EXPECT_REFUSED(read(folder / "a.h5", 0, "none"), "a.h5", "num-projs: expected 1 to 10000 projections, got 0");
   const std::string bytes = bytes_of(kFile);
   put(folder / "a.h5", with(bytes, "num-projs", "num-proja"));
@@ -200,20 +195,10 @@ TEST(Xreg, DiagnosesFaults) {
 
 /// Nothing that a damaged file says may make the reader crash, take much memory, or fail without the file's name. HDF5
 /// itself reads the file, so this is about what it lets through.
-TEST(Xreg, DamagedFilesAreRefused) {
-  const TemporaryFolder folder;
+TEST_F(Xreg, DamagedFilesAreRefused) {
   const std::string bytes = write(folder / "good.h5");
-  const Sample sample{"a.h5", bytes, bytes.size(), {}, true};
-  std::string said;
-  int refused = 0;
-  for (const Damaged& copy : damaged_copies(sample, 60, 300)) {
-    put(folder / "a.h5", copy.bytes);
-    const Outcome outcome = outcome_of([&] { read(folder / "a.h5", 0, "none"); }, "a.h5", 256 << 20, said);
-    EXPECT_TRUE(outcome == Outcome::refused || outcome == Outcome::accepted)
-        << copy.how << ": " << name_of(outcome) << ": " << said;
-    refused += outcome == Outcome::refused;
-  }
-  EXPECT_GT(refused, 60);
+  expect_handled(folder, {"a.h5", bytes, bytes.size(), {}, true}, [](const auto& path) { read(path, 0, "none"); },
+                 {.cuts = 60, .changes = 300, .memory = 256 << 20, .least_refused = 60});
 }
 
 }  // namespace xreg_test

@@ -9,7 +9,7 @@
 namespace description_test {
 
 using namespace marrow;
-using marrow::test::kPlain, marrow::test::message_of, marrow::test::with, marrow::test::Written;
+using namespace marrow::test;
 using network::Output, network::read_description;
 
 std::string fault_of(const std::string& text) {

@@ -13,8 +13,7 @@
 namespace inference_test {
 
 using namespace marrow;
-using marrow::test::Convolution, marrow::test::kPlain, marrow::test::message_of, marrow::test::with,
-    marrow::test::Written;
+using namespace marrow::test;
 using network::Network, network::read_description;
 
 /// A kernel without symmetry.

@@ -12,8 +12,7 @@
 namespace view_maps_test {
 
 using namespace marrow;
-using marrow::test::Convolution, marrow::test::kPlain, marrow::test::message_of, marrow::test::with,
-    marrow::test::Written;
+using namespace marrow::test;
 using network::Normalisation;
 
 /// The value itself.

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "implant_node.hpp"
+#include "node_readers.hpp"
 
 #include "tests/harness/without_registration.hpp"  // before the node
 

@@ -4,56 +4,24 @@
 #include <algorithm>
 #include <cctype>
 #include <fstream>
+#include <iterator>
+#include <sstream>
 #include <stdexcept>
 
 namespace marrow::fuzz {
 namespace {
 
-constexpr std::uint64_t kNumbers[] = {0,
-                                      1,
-                                      2,
-                                      3,
-                                      7,
-                                      8,
-                                      16,
-                                      127,
-                                      128,
-                                      255,
-                                      256,
-                                      4095,
-                                      32767,
-                                      32768,
-                                      65535,
-                                      65536,
-                                      0x7fffffff,
-                                      0x80000000,
-                                      0xfffffffe,
-                                      0xffffffff,
-                                      0x10000000,
-                                      1000000000,
-                                      0x7fffffffffffffff,
-                                      0x8000000000000000,
-                                      0xffffffffffffffff};
-constexpr const char* kDigits[] = {"0",
-                                   "-1",
-                                   "1",
-                                   "2",
-                                   "65536",
-                                   "2147483647",
-                                   "-2147483648",
-                                   "4294967296",
-                                   "9223372036854775807",
-                                   "99999999999999999999",
-                                   "1e30",
-                                   "-1e9",
-                                   "1e-9",
-                                   "0.001",
-                                   "nan",
-                                   "inf",
-                                   "-inf",
-                                   "1e999",
-                                   "0x10",
-                                   "010"};
+/// Numbers in digits that are often at the border of a range.
+const std::vector<std::string>& digits() {
+  static const std::vector<std::string> all = [] {
+    std::istringstream words(
+        "0 -1 1 2 65536 2147483647 -2147483648 4294967296 9223372036854775807 99999999999999999999 1e30 -1e9 1e-9 "
+        "0.001 "
+        "nan inf -inf 1e999 0x10 010");
+    return std::vector<std::string>(std::istream_iterator<std::string>(words), {});
+  }();
+  return all;
+}
 
 std::string unescaped(const std::string& text) {
   std::string word;
@@ -131,12 +99,13 @@ void Mutator::change(std::string& bytes, const std::string& other) {
   }
 }
 
-/// Writes a number of 1 to 8 bytes in either order. It is often at the border of a range.
+/// Writes a number of 1 to 8 bytes in either order: a power of two, or 1 or 2 less.
 void Mutator::put_number(std::string& bytes) {
   const std::size_t width = std::size_t(1) << below(4);
   if (bytes.size() < width) return;
   const std::size_t at = below(bytes.size() - width + 1);
-  const std::uint64_t number = kNumbers[below(std::size(kNumbers))];
+  const std::size_t bit = below(65);
+  const std::uint64_t number = (bit < 64 ? std::uint64_t(1) << bit : 0) - below(3);
   const bool big_endian = below(2);
   for (std::size_t i = 0; i < width; ++i) bytes[at + i] = char(number >> 8 * (big_endian ? width - 1 - i : i));
 }
@@ -153,7 +122,7 @@ void Mutator::put_digits(std::string& bytes) {
   const std::size_t begin = begins[below(begins.size())];
   std::size_t end = begin;
   while (is_digit(end)) ++end;
-  bytes.replace(begin, end - begin, kDigits[below(std::size(kDigits))]);
+  bytes.replace(begin, end - begin, digits()[below(digits().size())]);
 }
 
 }  // namespace marrow::fuzz

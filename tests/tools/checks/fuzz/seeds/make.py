@@ -1,8 +1,9 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Writes the inputs that the fuzz targets begin with: make.py FOLDER. Each is small, whole and made here. If a target
-reads several formats, the first byte names the format."""
+"""Writes the inputs that the fuzz targets begin with, and their dictionaries: make.py FOLDER. Each input is small, whole
+and made here. If a target reads several formats, the first byte names the format."""
 import pathlib
+import re
 import sys
 
 import dicom
@@ -38,6 +39,9 @@ def main():
         (folder / target).mkdir(parents=True, exist_ok=True)
         for name, content in seeds().items():
             (folder / target / name).write_bytes(content)
+    text = (pathlib.Path(__file__).parents[1] / "dictionaries.txt").read_text()
+    for target, words in re.findall(r"^\[(\w+)\]\n((?:\".*\n)+)", text, re.M):
+        (folder / (target + ".dict")).write_text("\n".join(re.findall(r'"(?:\\.|[^"\\])*"', words)) + "\n")
     (folder / "made").write_text("")
 
 
