@@ -3,8 +3,8 @@
 #
 # A static library for nodes, installed as marrow::NAME: a topic of the toolbox, or what only one kind needs. HEADERS
 # are the public ones; FOLDER says how they are included: marrow/FOLDER/file.hpp. Without sources it is a library of
-# headers. The files after APART are sources that need a heavy library, so they are compiled by themselves: a node that
-# calls none of them does not load it.
+# headers. The files after APART are sources that are compiled by themselves: a node that calls none of them does not
+# load the libraries that they need.
 function(marrow_add_library name)
   cmake_parse_arguments(PARSE_ARGV 1 library "" "FOLDER" "SOURCES;HEADERS;LINK;NEEDS;OBJECTS;APART")
   set(target library_${name})
