@@ -121,7 +121,8 @@ def experiment(kind):
     return {
         "name": "edge detectors on the femur",
         "file": "experiments/edges.yaml",
-        "help": "Does the edge detector or the optimizer change how far a start may lie and how close the result comes?",
+        "help": "Does the edge detector or the optimizer change how far a start may lie and how close the result "
+        "comes?",
         "text": "marrow: 1\npipeline: ../pipelines/femur/femur.yaml\nvariants:\n  canny: {edges.uses: edges.canny}\n",
         "pipeline_text": (SOURCE / "pipelines/femur/femur.yaml").read_text(),
         "seed": 7,
