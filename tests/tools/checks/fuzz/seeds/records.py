@@ -166,8 +166,8 @@ def name_seeds():
 
 
 KEY = "0123456789abcdef0123456789abcdef"
-NODE = """{"id": "one", "uses": "test.constant", "status": "done", "calls": 1, "cached": 0, "start_s": 0.5, "seconds": 0.1,
- "peak_process_memory_mb": 50, "keys": {"number": "KEY"}, "items": {"number": [["", "KEY"]]}, "functions": [],
+NODE = """{"id": "one", "uses": "test.constant", "status": "done", "calls": 1, "cached": 0, "start_s": 0.5,
+ "seconds": 0.1, "peak_process_memory_mb": 50, "keys": {"number": "KEY"}, "items": {"number": [["", "KEY"]]}, "functions": [],
  "random": false, "files": {"path": null, "other": "KEY"}, "library": "marrow_a.so", "build_id": "KEY",
  "inputs": {"a": "KEY"}}"""
 RUN = """{"marrow": "0.1.0", "framework": "KEY", "pipeline": "p", "finished": "2026-01-01T00:00:00Z", "status": "done",
