@@ -15,8 +15,8 @@ import sys
 from starting import ALL, arguments_parser, conclude, program_of
 from subjects import SENTENCE, Collect, Compare, Run
 
-CALLS = """open read write close rename mkdir remove truncate fsync lock mmap malloc loader_malloc thread fork exec pipe dup
-poll""".split()
+CALLS = """open read write close rename mkdir remove truncate fsync lock mmap malloc loader_malloc thread fork exec pipe
+dup poll""".split()
 Fault = collections.namedtuple("Fault", "subject where call n times below")
 HELP = (
     "SUBJECT/main|children/CALL/N/1|forever/PLACE: only this fault, as the list of failures names it; PLACE is"

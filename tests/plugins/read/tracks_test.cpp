@@ -97,8 +97,9 @@ const std::string kHeader = "JT_EULER_312\n x_tran, y_tran, z_tran, z_rot, x_rot
 
 class ReadJointTrack : public InAFolder {
  protected:
-  static List<Pose> read(const std::filesystem::path& path, const shipped::Options& options = {}) {
-    return list_by<Pose>("read.jointtrack", path, options);
+  static List<Pose> read(const std::filesystem::path& path, shipped::Options options = {}) {
+    options["path"] = path.string();
+    return shipped::call("read.jointtrack", {}, options).at("poses").as_list<Pose>();
   }
   List<Pose> of(const std::string& text, const shipped::Options& options = {}) {
     put(folder / "a.jts", text);

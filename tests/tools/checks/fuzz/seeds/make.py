@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Writes the inputs that the fuzz targets begin with, and their dictionaries: make.py FOLDER. Each input is small, whole
-and made here. If a target reads several formats, the first byte names the format."""
+"""Writes the inputs that the fuzz targets begin with, and their dictionaries: make.py FOLDER. Each input is small,
+whole and made here. If a target reads several formats, the first byte names the format."""
 import pathlib
 import re
 import sys

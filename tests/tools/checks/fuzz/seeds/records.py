@@ -166,17 +166,17 @@ def name_seeds():
 
 
 KEY = "0123456789abcdef0123456789abcdef"
-NODE = """{"id": "one", "uses": "test.constant", "status": "done", "calls": 1, "cached": 0, "start_s": 0.5, "seconds": 0.1,
- "peak_process_memory_mb": 50, "keys": {"number": "KEY"}, "items": {"number": [["", "KEY"]]}, "functions": [],
- "random": false, "files": {"path": null, "other": "KEY"}, "library": "marrow_a.so", "build_id": "KEY",
+NODE = """{"id": "one", "uses": "test.constant", "status": "done", "calls": 1, "cached": 0, "start_s": 0.5,
+ "seconds": 0.1, "peak_process_memory_mb": 50, "keys": {"number": "KEY"}, "items": {"number": [["", "KEY"]]},
+ "functions": [], "random": false, "files": {"path": null, "other": "KEY"}, "library": "marrow_a.so", "build_id": "KEY",
  "inputs": {"a": "KEY"}}"""
 RUN = """{"marrow": "0.1.0", "framework": "KEY", "pipeline": "p", "finished": "2026-01-01T00:00:00Z", "status": "done",
  "seconds": 1, "seed": 1, "threads": 2, "cpu_level": "x86-64", "inputs": {"amount": "3"},
  "overrides": ["one.value=3"], "nodes": [], "plugins": [{"file": "marrow_a.so", "build_id": "KEY", "links": []}],
  "outputs": [{"name": "sum", "files": ["outputs/sum.json"],
    "items": [["a/b", "KEY"], ["c", "00000000000000000000000000000000"]], "fault": ""}]}"""
-CELL = """{"id": "a/b/0", "variant": "a", "case": "b", "start": "0", "status": "done", "tries": 1, "values": [1.5, null],
- "units": ["mm", ""], "initial_error": 3, "seconds": null, "evaluations": 100,
+CELL = """{"id": "a/b/0", "variant": "a", "case": "b", "start": "0", "status": "done", "tries": 1,
+ "values": [1.5, null], "units": ["mm", ""], "initial_error": 3, "seconds": null, "evaluations": 100,
  "nodes": {"one": {"made": 1, "cached": 0, "seconds": 0.5}}, "key": "KEY"}"""
 
 
