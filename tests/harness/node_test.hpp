@@ -21,6 +21,7 @@
 #include "tests/harness/bodies.hpp"
 #include "tests/harness/cameras.hpp"
 #include "tests/harness/edges.hpp"
+#include "tests/harness/figures.hpp"
 #include "tests/harness/functions.hpp"
 #include "tests/harness/grids.hpp"
 #include "tests/harness/heard.hpp"

@@ -1,17 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <gtest/gtest.h>
-
 #include "marrow/toolbox/geometry/camera_deviations.hpp"
-#include "tests/framework/domain/shapes.hpp"
 #include "tests/plugins/deviations/square_across_beam.hpp"
 
-namespace deviations_cameras_test {
+namespace marrow::test::deviations_cameras_test {
 
-using namespace marrow;
 using namespace square_across_beam;
 using geometry::CameraDeviations;
 
-shipped::Inputs inputs(const CameraDeviations& stated, const std::string& view = "only") {
+Inputs inputs(const CameraDeviations& stated, const std::string& view = "only") {
   List<CameraDeviations> list;
   list.add(view, stated);
   return {{"stages", shipped::list(stages(), "stage")},
@@ -22,7 +18,7 @@ shipped::Inputs inputs(const CameraDeviations& stated, const std::string& view =
 
 /// The standard deviation of the pose about (0 to 2, in degrees) or along (3 to 5, in mm) an axis.
 double added(const CameraDeviations& stated, int axis) {
-  const Pose pose = shipped::call("deviations.cameras", inputs(stated)).at("pose").as<Pose>();
+  const Pose pose = output<Pose>("deviations.cameras", "pose", inputs(stated));
   return std::sqrt((*pose.covariance)(axis, axis)) * (axis < 3 ? degrees(1) : 1);
 }
 
@@ -40,12 +36,12 @@ TEST(DeviationsOfCameras, EachErrorMovesThePoseAsMuchAsTheCamera) {
 }
 
 TEST(DeviationsOfCameras, NothingStatedAddsNothing) {
-  const Pose found = shipped::call("deviations.cameras", inputs({})).at("pose").as<Pose>();
+  const Pose found = output<Pose>("deviations.cameras", "pose", inputs({}));
   EXPECT_EQ(hash_of(found), hash_of(pose()));
 }
 
 TEST(DeviationsOfCameras, SaysWhatIsWrong) {
-  EXPECT_EQ(shipped::refusal("deviations.cameras", inputs({}, "frontal")),
+  EXPECT_EQ(refusal("deviations.cameras", inputs({}, "frontal")),
             "camera_deviations and views are not of the same views; wire both from the node that reads the views");
 }
 
@@ -59,18 +55,16 @@ TEST(DeviationsOfCameras, AreAddedToCalibratedOnesWithoutTheirFactors) {
   narrow.add("final", pose);
   (*pose.covariance)(3, 3) += 100;
   wide.add("final", pose);
-  shipped::Inputs all{{"stages", shipped::list(narrow, "stage")},
-                      {"widened", shipped::list(wide, "stage")},
-                      {"model", shipped::item(test::box({1, 2, 3}, {20, 30, 100}))}};
-  const shipped::Options options{{"translation_factors", std::vector<double>{2, 2, 2}}};
-  const Pose found = shipped::call("deviations.calibrated", all, options).at("pose").as<Pose>();
+  Inputs all{{"stages", shipped::list(narrow, "stage")},
+             {"widened", shipped::list(wide, "stage")},
+             {"model", item(test::box({1, 2, 3}, {20, 30, 100}))}};
+  const Options options{{"translation_factors", Numbers{2, 2, 2}}};
+  const Pose found = output<Pose>("deviations.calibrated", "pose", all, options);
   EXPECT_NEAR((*found.covariance)(3, 3), 4 + 100, 1e-9);
   EXPECT_NEAR((*found.covariance)(4, 4), 4, 1e-9);
-  List<Pose> other;
-  other.add("first", pose);
-  all["widened"] = shipped::list(other, "stage");
-  EXPECT_EQ(shipped::refusal("deviations.calibrated", all, options),
+  all["widened"] = shipped::list(named("first", pose), "stage");
+  EXPECT_EQ(refusal("deviations.calibrated", all, options),
             "widened and stages are not the same poses; wire the stages of the node that got these stages");
 }
 
-}  // namespace deviations_cameras_test
+}  // namespace marrow::test::deviations_cameras_test

@@ -1,13 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "plugins/deviations/metal_rims.hpp"
+#include "tests/harness/node_test.hpp"
 
-#include <gtest/gtest.h>
-
-#include "tests/framework/domain/shapes.hpp"
-
-namespace metal_rims_test {
-
-using namespace marrow;
+namespace marrow::test::metal_rims_test {
 
 /// 3 pixels a mm at the body, which is 1 m away.
 Camera camera() {
@@ -16,13 +11,13 @@ Camera camera() {
   camera.intrinsics << 3000, 0, 256, 0, 3000, 256, 0, 0, 1;
   return camera;
 }
-RigidTransform placed() { return {"world", "ct", Eigen::Matrix3d::Identity(), {0, 0, 1000}}; }
+RigidTransform placed() { return {"world", "ct", Matrix3d::Identity(), {0, 0, 1000}}; }
 
 /// A prism along y. Its section is a triangle whose sharp edge points to -x: the path along z grows by 1 mm a mm.
 Mesh wedge() {
   Mesh mesh;
   for (const double y : {-40.0, 40.0})
-    for (const Eigen::Vector2d& at : {Eigen::Vector2d(-20, 0), Eigen::Vector2d(20, 20), Eigen::Vector2d(20, -20)})
+    for (const Vector2d& at : {Vector2d(-20, 0), Vector2d(20, 20), Vector2d(20, -20)})
       mesh.vertices_mm.emplace_back(at.x(), y, at.y());
   mesh.triangles = {{0, 2, 1}, {3, 4, 5}, {0, 1, 4}, {0, 4, 3}, {1, 2, 5}, {1, 5, 4}, {2, 0, 3}, {2, 3, 5}};
   return mesh;
@@ -55,4 +50,4 @@ TEST(EdgeInside, OfABoxIsItsBorder) {
   EXPECT_NEAR(inside_px(test::box({0, 0, 0}, {40, 30, 20}), 256 - 3000 * 20 / 990.0, {1, 2}), 0, 0.25);
 }
 
-}  // namespace metal_rims_test
+}  // namespace marrow::test::metal_rims_test

@@ -1,16 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 // A flat square across the beam, 1000 mm from the source: how each error of the image moves it is known by hand.
-#include <cmath>
+#include "tests/harness/node_test.hpp"
 
-#include "marrow/domain/camera.hpp"
-#include "marrow/domain/functions.hpp"
-#include "marrow/domain/pose.hpp"
-#include "shipped.hpp"
-
-namespace square_across_beam {
-
-using namespace marrow;
+namespace marrow::test::square_across_beam {
 
 /// The borders of a square of about 40 mm, a little uneven so that they determine all six axes.
 class Square : public OutlineProjector {
@@ -20,15 +13,15 @@ class Square : public OutlineProjector {
     for (int side = 0; side < 4; ++side)
       for (int i = -5; i <= 5; ++i) {
         const double along = 4.0 * i, out = 20 + side;
-        const Eigen::Vector2d normal = side == 0   ? Eigen::Vector2d(1, 0)
-                                       : side == 1 ? Eigen::Vector2d(0, 1)
-                                       : side == 2 ? Eigen::Vector2d(-1, 0)
-                                                   : Eigen::Vector2d(0, -1);
-        const Eigen::Vector3d at(out * normal.x() - along * normal.y(), out * normal.y() + along * normal.x(),
-                                 3 * std::sin(7.0 * side + i));
-        const Eigen::Vector3d seen = camera.camera_from_world * (pose * at);
+        const Vector2d normal = side == 0   ? Vector2d(1, 0)
+                                : side == 1 ? Vector2d(0, 1)
+                                : side == 2 ? Vector2d(-1, 0)
+                                            : Vector2d(0, -1);
+        const Vector3d at(out * normal.x() - along * normal.y(), out * normal.y() + along * normal.x(),
+                          3 * std::sin(7.0 * side + i));
+        const Vector3d seen = camera.camera_from_world * (pose * at);
         OutlinePoint point;
-        const Eigen::Vector2d pixel = (camera.intrinsics * seen).hnormalized();
+        const Vector2d pixel = (camera.intrinsics * seen).hnormalized();
         point.u_px = float(pixel.x()), point.v_px = float(pixel.y());
         point.normal_u = float(normal.x()), point.normal_v = float(normal.y());
         point.model_mm = at.cast<float>();
@@ -63,4 +56,4 @@ inline List<Pose> stages() {
 
 inline Value projector() { return Value::of<OutlineProjector>(std::make_shared<const Square>()); }
 
-}  // namespace square_across_beam
+}  // namespace marrow::test::square_across_beam

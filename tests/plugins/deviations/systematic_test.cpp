@@ -1,12 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // A flat square across the beam: how each error of the image moves it is known by hand.
-#include <gtest/gtest.h>
-
 #include "tests/plugins/deviations/square_across_beam.hpp"
 
-namespace systematic_test {
+namespace marrow::test::systematic_test {
 
-using namespace marrow;
 using namespace square_across_beam;
 
 struct Errors {
@@ -14,21 +11,18 @@ struct Errors {
 };
 
 Pose added(const Errors& errors) {
-  const Mesh model =
-      shipped::call("simulate.knee_implant", {}, {{"part", "tray"}, {"resolution_mm", 2.0}}).at("mesh").as<Mesh>();
-  return shipped::call("deviations.systematic",
-                       {{"stages", shipped::list(stages(), "stage")},
-                        {"model", shipped::item(model)},
-                        {"projector", projector()},
-                        {"views", shipped::list(views(), "view")}},
-                       {{"offset_px", errors.offset_px},
-                        {"camera_px", errors.camera_px},
-                        {"camera_depth_percent", errors.depth_percent},
-                        {"surface_mm", errors.surface_mm},
-                        {"surface_reach_mm", errors.surface_reach_mm},
-                        {"opaque_mm", errors.opaque_mm}})
-      .at("pose")
-      .as<Pose>();
+  const Mesh model = output<Mesh>("simulate.knee_implant", "mesh", {}, {{"part", "tray"}, {"resolution_mm", 2.0}});
+  return output<Pose>("deviations.systematic", "pose",
+                      {{"stages", shipped::list(stages(), "stage")},
+                       {"model", item(model)},
+                       {"projector", projector()},
+                       {"views", shipped::list(views(), "view")}},
+                      {{"offset_px", errors.offset_px},
+                       {"camera_px", errors.camera_px},
+                       {"camera_depth_percent", errors.depth_percent},
+                       {"surface_mm", errors.surface_mm},
+                       {"surface_reach_mm", errors.surface_reach_mm},
+                       {"opaque_mm", errors.opaque_mm}});
 }
 
 // 1 pixel at 1000 mm is a third of a millimetre.
@@ -72,4 +66,4 @@ TEST(Systematic, MetalThatLetsRadiationPassIsOneMoreError) {
   EXPECT_GT(of_titanium, of_steel);
 }
 
-}  // namespace systematic_test
+}  // namespace marrow::test::systematic_test

@@ -1,13 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "marrow/similarity/blur.hpp"
-
-#include <gtest/gtest.h>
-
-#include <cmath>
 #include <opencv2/imgproc.hpp>
-#include <random>
 
-namespace blur_test {
+#include "marrow/similarity/blur.hpp"
+#include "tests/harness/node_test.hpp"
+
+namespace marrow::test::blur_test {
 
 constexpr int kSize_px = 240;
 
@@ -25,8 +22,8 @@ cv::Mat image_of(const LineIntegral& line_integral, double noise) {
 }
 
 /// Edges along a line through the middle of the image, whose bright side is at `angle`.
-marrow::EdgeMap edges_at(double angle, double inside_px = 0) {
-  marrow::EdgeMap edges{kSize_px, kSize_px, {}};
+EdgeMap edges_at(double angle, double inside_px = 0) {
+  EdgeMap edges{kSize_px, kSize_px, {}};
   const double du = std::cos(angle), dv = std::sin(angle);
   for (int along = -80; along <= 80; ++along)
     edges.pixels.push_back(
@@ -44,7 +41,7 @@ TEST(Blur, OfAStep) {
               return 0.2 + 0.4 * std::erfc(way / (sigma * std::sqrt(2.0)));
             },
             noise);
-        EXPECT_NEAR(marrow::image::blur_px(image, edges_at(angle)), sigma, noise > 0 ? 0.15 * sigma : 0.08)
+        EXPECT_NEAR(image::blur_px(image, edges_at(angle)), sigma, noise > 0 ? 0.15 * sigma : 0.08)
             << sigma << " px at " << angle << " with noise " << noise;
       }
 }
@@ -58,17 +55,17 @@ TEST(Blur, ARoundBonesBorderIsSteepestInsideItsSilhouette) {
     for (double q = 0; q < 4; q += 0.001) slope += std::exp(-0.5 * (x - q * q) * (x - q * q));
     if (slope > steepest) steepest = slope, at = x;
   }
-  EXPECT_NEAR(at, marrow::image::border_inside_px(1), 0.01);
-  EXPECT_EQ(marrow::image::border_inside_px(3), 3 * marrow::image::border_inside_px(1));
+  EXPECT_NEAR(at, image::border_inside_px(1), 0.01);
+  EXPECT_EQ(image::border_inside_px(3), 3 * image::border_inside_px(1));
 }
 
 TEST(Blur, OfTooFewEdgesIsNone) {
-  marrow::EdgeMap few = edges_at(0);
+  EdgeMap few = edges_at(0);
   few.pixels.resize(19);
   const cv::Mat image = image_of([](int u, int) { return u < 120 ? 1.0 : 0.2; }, 0);
-  EXPECT_EQ(marrow::image::blur_px(image, few), 0);
-  EXPECT_EQ(marrow::image::blur_px(image, {}), 0);
-  EXPECT_EQ(marrow::image::blur_px({}, edges_at(0)), 0);
+  EXPECT_EQ(image::blur_px(image, few), 0);
+  EXPECT_EQ(image::blur_px(image, {}), 0);
+  EXPECT_EQ(image::blur_px({}, edges_at(0)), 0);
 }
 
-}  // namespace blur_test
+}  // namespace marrow::test::blur_test

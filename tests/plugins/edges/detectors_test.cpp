@@ -1,27 +1,18 @@
 // SPDX-License-Identifier: Apache-2.0
 // What every edge detector must do, on images whose edges are known exactly.
-#include <gtest/gtest.h>
 #include <tbb/global_control.h>
-
 #include <chrono>
-#include <cmath>
 #include <cstdio>
 #include <cstring>
 #include <filesystem>
-#include <limits>
-#include <marrow/domain/features.hpp>
 #include <numeric>
 #include <opencv2/imgcodecs.hpp>
-#include <string>
 
-#include "shipped.hpp"
-#include "tests/harness/message_of.hpp"
 #include "tests/plugins/edges/drawn.hpp"
 
-namespace detectors_test {
+namespace marrow::test::detectors_test {
 
 using edges::drawn;
-using marrow::test::message_of;
 
 class Edges : public testing::TestWithParam<std::string> {
  protected:
@@ -35,19 +26,18 @@ TEST_P(Edges, LieOnAStraightStepAtAnyOrientation) {
   double largest = 0, sum = 0, largest_turn_deg = 0;
   int count = 0;
   for (double angle_deg = 0; angle_deg < 360; angle_deg += 15) {
-    const double nu = std::cos(marrow::radians(angle_deg)), nv = std::sin(marrow::radians(angle_deg)),
-                 at = 0.013 * angle_deg;
+    const double nu = std::cos(radians(angle_deg)), nv = std::sin(radians(angle_deg)), at = 0.013 * angle_deg;
     const auto side = [&](double u, double v) { return (u - 63.5) * nu + (v - 63.5) * nv - at; };
     const auto view = drawn(128, [&](double u, double v) { return side(u, v) > 0 ? 11000.0 : 10000.0; });
-    const marrow::EdgeMap edges = find_edges(view);
+    const EdgeMap edges = find_edges(view);
     EXPECT_EQ(edges.width_px, 128);
     EXPECT_GT(edges.pixels.size(), 100u) << angle_deg;
-    for (const marrow::EdgePixel& edge : edges.pixels) {
+    for (const EdgePixel& edge : edges.pixels) {
       const double error = side(edge.u_px, edge.v_px);
       largest = std::max(largest, std::abs(error));
       sum += error, ++count;
-      largest_turn_deg = std::max(
-          largest_turn_deg, marrow::degrees(std::acos(std::min(1.0, edge.direction_u * nu + edge.direction_v * nv))));
+      largest_turn_deg =
+          std::max(largest_turn_deg, degrees(std::acos(std::min(1.0, edge.direction_u * nu + edge.direction_v * nv))));
     }
   }
   std::printf("straight step: mean %.4f px, largest %.4f px, direction within %.2f deg\n", sum / count, largest,
@@ -60,15 +50,15 @@ TEST_P(Edges, LieOnAStraightStepAtAnyOrientation) {
 TEST_P(Edges, OfADarkDiscPointOutwardsAndComeInRowOrder) {
   const auto view =
       drawn(200, [](double u, double v) { return std::hypot(u - 101.3, v - 98.6) < 60.4 ? 28500.0 : 30000.0; });
-  const marrow::EdgeMap edges = find_edges(view);
+  const EdgeMap edges = find_edges(view);
   EXPECT_GT(edges.pixels.size(), 300u);
   double sum = 0, largest = 0;
   int last = -1;
-  for (const marrow::EdgePixel& edge : edges.pixels) {
+  for (const EdgePixel& edge : edges.pixels) {
     const double du = edge.u_px - 101.3, dv = edge.v_px - 98.6, radius = std::hypot(du, dv);
     EXPECT_GT((du * edge.direction_u + dv * edge.direction_v) / radius, 0.999);
     EXPECT_NEAR(std::hypot(edge.direction_u, edge.direction_v), 1, 1e-5);
-    const double sharp = 1500 / (std::sqrt(2 * marrow::kPi) * 1.5);  // before the blur of pixel and mask
+    const double sharp = 1500 / (std::sqrt(2 * kPi) * 1.5);  // before the blur of pixel and mask
     EXPECT_NEAR(edge.magnitude, 0.93 * sharp, 0.08 * sharp);
     sum += radius - 60.4;
     largest = std::max(largest, std::abs(radius - 60.4));
@@ -96,7 +86,7 @@ TEST_P(Edges,
       256, [](double u, double v) { return 50000 * std::pow(0.1, u / 255) * (std::abs(v - 128) < 20 ? 0.9 : 1.0); },
       30);
   std::vector<int> upper(256, 0), lower(256, 0);
-  for (const marrow::EdgePixel& edge : find_edges(view).pixels) {
+  for (const EdgePixel& edge : find_edges(view).pixels) {
     if (std::abs(edge.v_px - 108) < 1) upper[std::size_t(edge.u_px)] = 1;
     if (std::abs(edge.v_px - 148) < 1) lower[std::size_t(edge.u_px)] = 1;
   }
@@ -105,14 +95,14 @@ TEST_P(Edges,
 }
 
 /// The largest run of rows in which no edge lies within 2 px of a border of the shaft.
-int largest_gap(const marrow::EdgeMap& edges, const marrow::View& view, const radiograph::Cylinder& bone) {
-  const Eigen::Vector3d source = marrow::source_position_mm(view.camera);
+int largest_gap(const EdgeMap& edges, const View& view, const radiograph::Cylinder& bone) {
+  const Vector3d source = source_position_mm(view.camera);
   std::vector<int> seen(edges.height_px, 0);
-  for (const marrow::EdgePixel& edge : edges.pixels) {
-    const Eigen::Vector3d ray = marrow::ray_direction(view.camera, {edge.u_px, edge.v_px});
-    const Eigen::Vector3d normal = ray.cross(bone.direction).normalized();
+  for (const EdgePixel& edge : edges.pixels) {
+    const Vector3d ray = ray_direction(view.camera, {edge.u_px, edge.v_px});
+    const Vector3d normal = ray.cross(bone.direction).normalized();
     const double miss_mm = normal.dot(source - bone.point);  // signed distance of the ray from the shaft's axis
-    const double off_px = (std::abs(miss_mm) - bone.radius_mm) / marrow::pixel_size_at_mm(view.camera, bone.point);
+    const double off_px = (std::abs(miss_mm) - bone.radius_mm) / pixel_size_at_mm(view.camera, bone.point);
     if (std::abs(off_px) < 2.5) seen[std::size_t(std::lround(edge.v_px))] |= miss_mm > 0 ? 1 : 2;
   }
   int gap = 0, largest = 0;
@@ -127,7 +117,7 @@ TEST_P(Edges, OfANoisyHollowBoneInAThighAreContinuous) {
   for (const double photons : {3000.0, 20000.0}) {
     const auto scene = radiograph::shaft({5, 3, 0}, {0.08, 0.05, 1});
     const auto view = radiograph::image("frontal", radiograph::camera(0), scene, photons, 7);
-    const marrow::EdgeMap edges = find_edges(view);
+    const EdgeMap edges = find_edges(view);
     const int gap = largest_gap(edges, view, scene.cylinders[1]);
     std::printf("hollow bone, %.0f photons: largest gap %d rows, %zu edges\n", photons, gap, edges.pixels.size());
     EXPECT_LE(gap, 3);
@@ -140,7 +130,7 @@ TEST_P(Edges, KeepAwayFromMaskCollimatorAndImageBorder) {
       256, [&](double u, double v) { return disc(u, v) > 120  ? 100.0
                                             : disc(u, v) < 40 ? 10000.0
                                                               : 30000.0; }, 20);
-  for (const marrow::EdgePixel& edge : find_edges(view).pixels) EXPECT_LT(disc(edge.u_px, edge.v_px), 100);
+  for (const EdgePixel& edge : find_edges(view).pixels) EXPECT_LT(disc(edge.u_px, edge.v_px), 100);
   const auto scattered = drawn(  // as behind a real collimator: not black, and blurred
       256,
       [&](double u, double v) {
@@ -149,14 +139,14 @@ TEST_P(Edges, KeepAwayFromMaskCollimatorAndImageBorder) {
                inside * (std::abs(u - 128) < 30 ? 8000 : 30000);
       },
       20);
-  const marrow::EdgeMap in_scatter = find_edges(scattered);
+  const EdgeMap in_scatter = find_edges(scattered);
   EXPECT_GT(in_scatter.pixels.size(), 350u);
-  for (const marrow::EdgePixel& edge : in_scatter.pixels) EXPECT_LT(disc(edge.u_px, edge.v_px), 115);
+  for (const EdgePixel& edge : in_scatter.pixels) EXPECT_LT(disc(edge.u_px, edge.v_px), 115);
   view.mask = cv::Mat(256, 256, CV_8U, cv::Scalar(0));
   view.mask.colRange(0, 128) = 255;
-  const marrow::EdgeMap edges = find_edges(view);
+  const EdgeMap edges = find_edges(view);
   EXPECT_GT(edges.pixels.size(), 80u);
-  for (const marrow::EdgePixel& edge : edges.pixels) EXPECT_LT(edge.u_px, 128 - 4);
+  for (const EdgePixel& edge : edges.pixels) EXPECT_LT(edge.u_px, 128 - 4);
 }
 
 // Real frames of a knee (Brown University, see the data folder's README): an intensifier's round field with scatter
@@ -166,12 +156,12 @@ TEST_P(Edges, KeepInsideTheFieldOfRealFrames) {
   if (!std::filesystem::exists(folder)) GTEST_SKIP() << "the real knee is not here: " << folder;
   for (const auto& [name, u, v] : {std::tuple<std::string, double, double>{"L_Hop_Cam1_001_UND.0138.tif", 852, 868},
                                    {"L_Hop_Cam2_001_UND.0138.tif", 865, 898}}) {
-    marrow::View view;
+    View view;
     view.name = name;
     view.image.pixels = cv::imread(folder + name, cv::IMREAD_GRAYSCALE);
     view.camera = radiograph::camera(0, view.image.width());
-    const marrow::EdgeMap edges = find_edges(view);
-    const auto near_rim = std::count_if(edges.pixels.begin(), edges.pixels.end(), [&](const marrow::EdgePixel& edge) {
+    const EdgeMap edges = find_edges(view);
+    const auto near_rim = std::count_if(edges.pixels.begin(), edges.pixels.end(), [&](const EdgePixel& edge) {
       return std::hypot(edge.u_px - u, edge.v_px - v) > 883 - 16;
     });
     std::printf("%s: %zu edges, %td within 16 px of the rim or beyond\n", name.c_str(), edges.pixels.size(), near_rim);
@@ -187,14 +177,14 @@ TEST_P(Edges, AreTheSameBytesWithOneAndTwoThreads) {
     tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
     return find_edges(view);
   };
-  const marrow::EdgeMap one = with_threads(1), two = with_threads(2);
+  const EdgeMap one = with_threads(1), two = with_threads(2);
   ASSERT_EQ(one.pixels.size(), two.pixels.size());
-  EXPECT_EQ(std::memcmp(one.pixels.data(), two.pixels.data(), one.pixels.size() * sizeof(marrow::EdgePixel)), 0);
+  EXPECT_EQ(std::memcmp(one.pixels.data(), two.pixels.data(), one.pixels.size() * sizeof(EdgePixel)), 0);
 }
 
 TEST_P(Edges, SayWhatIsWrongWithAnImage) {
-  marrow::View view = drawn(64, [](double u, double) { return u < 30 ? 500.0 : 900.0; });
-  const marrow::View good = view;
+  View view = drawn(64, [](double u, double) { return u < 30 ? 500.0 : 900.0; });
+  const View good = view;
   view.image.pixels = cv::Mat(64, 64, CV_16U, cv::Scalar(1234));
   EXPECT_EQ(message_of([&] { find_edges(view); }),
             "view 'frontal': all pixels have the same value 1234, so there is no edge; check the image file");
@@ -239,7 +229,7 @@ TEST_P(Edges, AreFoundInReasonableTime) {
 }
 
 TEST(Canny, DeclaresTheOrderOfItsThresholds) {
-  EXPECT_TRUE(shipped::declares("edges.canny", marrow::not_above("noise_low", "noise_high")));
+  EXPECT_TRUE(declares("edges.canny", not_above("noise_low", "noise_high")));
 }
 
-}  // namespace detectors_test
+}  // namespace marrow::test::detectors_test

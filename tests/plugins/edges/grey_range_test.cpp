@@ -1,22 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "marrow/toolbox/image/grey_range.hpp"
-
-#include <gtest/gtest.h>
-
-#include <cmath>
-#include <limits>
-
 #include "marrow/base/number_text.hpp"
 #include "marrow/toolbox/image/line_integrals.hpp"
-#include "shipped.hpp"
 #include "tests/plugins/edges/drawn.hpp"
 
-namespace grey_range_test {
+namespace marrow::test::grey_range_test {
 
-using marrow::EdgeMap;
-using marrow::View;
-using marrow::image::grey_range;
-using marrow::image::GreyScale;
+using image::grey_range;
+using image::GreyScale;
 
 /// A disc of 40 pixels radius with a line integral of 1.2 before air of 4000, in the shadow of a plate that lets
 /// nothing through. Its edges are blurred a little, so that the logarithm matters.
@@ -37,17 +28,17 @@ struct Found {
     hooks.log = [this](std::string_view text, marrow::LogLevel) { lines.emplace_back(text); };
     edges = edges::found(detector, view, marrow::Context(hooks));
   }
-  std::vector<std::string> lines;
+  Strings lines;
   EdgeMap edges;
 };
 
 /// The largest distance of an edge of `a`, off the pixel (20, 180), from the nearest one of `b`.
 double farthest_px(const EdgeMap& a, const EdgeMap& b) {
   double farthest = 0;
-  for (const marrow::EdgePixel& p : a.pixels) {
+  for (const EdgePixel& p : a.pixels) {
     if (std::hypot(p.u_px - 20, p.v_px - 180) < 15) continue;
     double nearest = INFINITY;
-    for (const marrow::EdgePixel& q : b.pixels)
+    for (const EdgePixel& q : b.pixels)
       nearest = std::min(nearest, double(std::hypot(p.u_px - q.u_px, p.v_px - q.v_px)));
     farthest = std::max(farthest, nearest);
   }
@@ -59,7 +50,7 @@ TEST(GreyRange, OnePixelDoesNotDecideTheScale) {
   const double air = grey_range(view.image.pixels).greatest;
   EXPECT_EQ(grey_range(view.image.pixels).beyond, 0u);
   view.image.pixels.at<std::uint16_t>(180, 20) = 65535;
-  const marrow::image::GreyRange range = grey_range(view.image.pixels);
+  const image::GreyRange range = grey_range(view.image.pixels);
   EXPECT_EQ(range.greatest, air);
   EXPECT_EQ(range.beyond, 1u);
   EXPECT_EQ(range.farthest, 65535);
@@ -98,7 +89,7 @@ TEST(GreyRange, EdgesAreTheSameWithABadPixel) {
     ASSERT_EQ(found.lines.size(), 1u) << node;
     EXPECT_EQ(found.lines[0],
               "view 'frontal': 1 of 40000 pixels is far beyond all others (65535, the others reach from 0 to " +
-                  marrow::formatted("{:g}", grey_range(clean.image.pixels).greatest) +
+                  formatted("{:g}", grey_range(clean.image.pixels).greatest) +
                   "), as defects of a detector and letters are; it counts as the nearest of the others");
     EXPECT_LT(farthest_px(right.edges, found.edges), 0.02) << node;
     EXPECT_LT(farthest_px(found.edges, right.edges), 0.02) << node;
@@ -133,4 +124,4 @@ TEST(GreyRange, NoiseAboutZeroIsNoOffset) {
   EXPECT_EQ(GreyScale(floats).dark(), 0);
 }
 
-}  // namespace grey_range_test
+}  // namespace marrow::test::grey_range_test

@@ -1,16 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "marrow/toolbox/image/line_integrals.hpp"
-
-#include <gtest/gtest.h>
-
-#include <cmath>
-#include <limits>
 #include <opencv2/core.hpp>
 
-namespace line_integrals_test {
+#include "marrow/toolbox/image/line_integrals.hpp"
+#include "tests/harness/node_test.hpp"
 
-using marrow::image::GreyScale;
-using marrow::image::line_integrals;
+namespace marrow::test::line_integrals_test {
+
+using image::GreyScale;
+using image::line_integrals;
 
 TEST(LineIntegrals, AreLogarithmsOfWhatIsLeft) {
   const cv::Mat grey = (cv::Mat_<std::uint16_t>(1, 5) << 1000, 500, 5, 4, 0);
@@ -52,4 +49,4 @@ TEST(LineIntegrals, WithoutLightAreThoseOfDarkPixels) {
   }
 }
 
-}  // namespace line_integrals_test
+}  // namespace marrow::test::line_integrals_test

@@ -2,38 +2,34 @@
 #pragma once
 // X-ray images of cylinders and balls by the exact length of each ray inside them: a shaft with its canal in a thigh,
 // with condyles, seen by a pinhole camera.
-#include <Eigen/Dense>
-#include <cmath>
-#include <marrow/domain/camera.hpp>
 #include <opencv2/core.hpp>
-#include <random>
-#include <string>
-#include <vector>
 
-namespace radiograph {
+#include "tests/harness/node_test.hpp"
+
+namespace marrow::test::radiograph {
 
 /// A C-arm view: source 600 mm before the isocentre, detector of size_px^2 pixels over 300 mm at 1000 mm. At 0 degrees
 /// the rays run along +y with the patient's left on the right and the head up; the angle turns about z.
-inline marrow::Camera camera(double angle_deg, int size_px = 512) {
-  marrow::Camera camera;
+inline Camera camera(double angle_deg, int size_px = 512) {
+  Camera camera;
   camera.width_px = camera.height_px = size_px;
   const double focal_px = 1000.0 / (300.0 / size_px);
   camera.intrinsics << focal_px, 0, 0.5 * (size_px - 1), 0, focal_px, 0.5 * (size_px - 1), 0, 0, 1;
-  Eigen::Matrix3d upright;
+  Matrix3d upright;
   upright << 1, 0, 0, 0, 0, -1, 0, 1, 0;
   camera.camera_from_world.rotation =
-      upright * Eigen::AngleAxisd(marrow::radians(angle_deg), Eigen::Vector3d::UnitZ()).toRotationMatrix();
+      upright * Eigen::AngleAxisd(radians(angle_deg), Vector3d::UnitZ()).toRotationMatrix();
   camera.camera_from_world.translation_mm = {0, 0, 600};
   return camera;
 }
 
 /// Attenuation relative to what surrounds the body: muscle 0.024, cortical bone 0.08, marrow 0.021 per mm.
 struct Cylinder {
-  Eigen::Vector3d point, direction;
+  Vector3d point, direction;
   double radius_mm, added_per_mm;
 };
 struct Ball {
-  Eigen::Vector3d centre;
+  Vector3d centre;
   double radius_mm, added_per_mm;
 };
 struct Scene {
@@ -42,24 +38,23 @@ struct Scene {
 };
 
 /// Length of the ray source + t * ray (unit) inside a cylinder or ball, from the roots of its quadratic.
-inline double chord_mm(const Eigen::Vector3d& source, const Eigen::Vector3d& ray, const Cylinder& body) {
-  const Eigen::Vector3d across = ray - body.direction * ray.dot(body.direction);
-  const Eigen::Vector3d from = source - body.point, start = from - body.direction * from.dot(body.direction);
+inline double chord_mm(const Vector3d& source, const Vector3d& ray, const Cylinder& body) {
+  const Vector3d across = ray - body.direction * ray.dot(body.direction);
+  const Vector3d from = source - body.point, start = from - body.direction * from.dot(body.direction);
   const double a = across.squaredNorm(), b = across.dot(start),
                c = start.squaredNorm() - body.radius_mm * body.radius_mm;
   return 2 * std::sqrt(std::max(0.0, b * b - a * c)) / a;
 }
-inline double chord_mm(const Eigen::Vector3d& source, const Eigen::Vector3d& ray, const Ball& body) {
-  const Eigen::Vector3d from = source - body.centre;
+inline double chord_mm(const Vector3d& source, const Vector3d& ray, const Ball& body) {
+  const Vector3d from = source - body.centre;
   const double b = ray.dot(from), c = from.squaredNorm() - body.radius_mm * body.radius_mm;
   return 2 * std::sqrt(std::max(0.0, b * b - c));
 }
 
 /// A shaft of 28 mm with a canal of 12 mm along `direction` through `point`, in a thigh of 150 mm.
-inline Scene shaft(const Eigen::Vector3d& point, const Eigen::Vector3d& direction, double outer_mm = 28,
-                   double canal_mm = 12) {
+inline Scene shaft(const Vector3d& point, const Vector3d& direction, double outer_mm = 28, double canal_mm = 12) {
   Scene scene;
-  scene.cylinders = {{Eigen::Vector3d(0, 0, 0), Eigen::Vector3d::UnitZ(), 75, 0.024},
+  scene.cylinders = {{Vector3d(0, 0, 0), Vector3d::UnitZ(), 75, 0.024},
                      {point, direction.normalized(), outer_mm / 2, 0.08 - 0.024},
                      {point, direction.normalized(), canal_mm / 2, 0.021 - 0.08}};
   return scene;
@@ -67,22 +62,21 @@ inline Scene shaft(const Eigen::Vector3d& point, const Eigen::Vector3d& directio
 
 /// 16 bit image with 60000 grey values and `photons` per pixel (0: no noise) beside the body; each pixel is the mean
 /// over 3 x 3 rays.
-inline marrow::View image(const std::string& name, const marrow::Camera& camera, const Scene& scene, double photons,
-                          unsigned seed) {
-  marrow::View view;
+inline View image(const std::string& name, const Camera& camera, const Scene& scene, double photons, unsigned seed) {
+  View view;
   view.name = name;
   view.camera = camera;
   view.image.pixels.create(camera.height_px, camera.width_px, CV_16U);
-  const Eigen::Vector3d source = marrow::source_position_mm(camera);
-  const Eigen::Matrix3d world_from_pixel = camera.camera_from_world.rotation.transpose() * camera.intrinsics.inverse();
+  const Vector3d source = source_position_mm(camera);
+  const Matrix3d world_from_pixel = camera.camera_from_world.rotation.transpose() * camera.intrinsics.inverse();
   std::mt19937 random(seed);
   std::normal_distribution<double> normal;
   for (int v = 0; v < camera.height_px; ++v)
     for (int u = 0; u < camera.width_px; ++u) {
       double mean = 0;
       for (int k = 0; k < 9; ++k) {
-        const Eigen::Vector3d ray =
-            (world_from_pixel * Eigen::Vector3d(u + (k % 3 - 1) / 3.0, v + (k / 3 - 1) / 3.0, 1)).normalized();
+        const Vector3d ray =
+            (world_from_pixel * Vector3d(u + (k % 3 - 1) / 3.0, v + (k / 3 - 1) / 3.0, 1)).normalized();
         double path = 0;
         for (const Cylinder& body : scene.cylinders) path += body.added_per_mm * chord_mm(source, ray, body);
         for (const Ball& body : scene.balls) path += body.added_per_mm * chord_mm(source, ray, body);
@@ -94,4 +88,6 @@ inline marrow::View image(const std::string& name, const marrow::Camera& camera,
   return view;
 }
 
-}  // namespace radiograph
+}  // namespace marrow::test::radiograph
+
+namespace radiograph = marrow::test::radiograph;

@@ -1,17 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "marrow/toolbox/image/field_of_view.hpp"
-
-#include <gtest/gtest.h>
-
-#include <cmath>
 #include <filesystem>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
-#include <random>
 
-namespace usable_test {
+#include "marrow/toolbox/image/field_of_view.hpp"
+#include "tests/harness/node_test.hpp"
 
-using namespace marrow::image;
+namespace marrow::test::usable_test {
+
+using namespace image;
 
 /// A limb with a bone across a round field of the given radius; beyond the field is scatter, and the outline is
 /// blurred.
@@ -42,7 +39,7 @@ void expect_outline(const cv::Mat& grey, double radius) {
   ASSERT_TRUE(field);
   double worst = 0;
   for (int i = 0; i < 360; ++i) {
-    const double angle = 2 * marrow::kPi * i / 360, r = field->radius(angle);
+    const double angle = 2 * kPi * i / 360, r = field->radius(angle);
     const cv::Point2d at = field->centre + r * cv::Point2d(std::cos(angle), std::sin(angle));
     if (at.x < 0 || at.y < 0 || at.x > grey.cols - 1 || at.y > grey.rows - 1) continue;
     worst = std::max(worst, std::abs(std::hypot(at.x - 243.4, at.y - 196.2) - radius));
@@ -78,7 +75,7 @@ TEST(Usable, TakesNoArcInTheLitFieldOfARectangularCollimatorForOne) {
 }
 
 TEST(Usable, LeavesAMarginEverywhere) {
-  marrow::View view;
+  View view;
   const cv::Mat grey = collimated(170, 1500);
   double smallest = 0, largest = 0;
   cv::minMaxLoc(grey, &smallest, &largest);
@@ -107,7 +104,7 @@ TEST(Usable, FindsTheFieldOfRealFrames) {
     ASSERT_TRUE(field) << name;
     const double down = other > 880 ? 1 : -1;
     const double at_right = field->centre.x + field->radius(0),
-                 at_other = field->centre.y + down * field->radius(down * marrow::kPi / 2);
+                 at_other = field->centre.y + down * field->radius(down * kPi / 2);
     std::printf("%s: radius %.1f about %.1f, %.1f; right end at %.1f, %s at %.1f\n", name.c_str(), field->harmonics[0],
                 field->centre.x, field->centre.y, at_right, down > 0 ? "lower" : "upper", at_other);
     EXPECT_NEAR(at_right, right, 4);
@@ -115,4 +112,4 @@ TEST(Usable, FindsTheFieldOfRealFrames) {
   }
 }
 
-}  // namespace usable_test
+}  // namespace marrow::test::usable_test

@@ -1,155 +1,108 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <gtest/gtest.h>
-
-#include <cmath>
-
-#include "shipped.hpp"
 #include "tests/plugins/edges/radiograph.hpp"
-#include "tests/plugins/evaluate/listener.hpp"
 #include "tests/plugins/initial/tube.hpp"
 
-namespace shaft_lines_test {
+namespace marrow::test::shaft_lines_test {
 
-using listener::Listener;
-using marrow::List, marrow::Mesh, marrow::ShaftLines, marrow::Truth, marrow::View;
+constexpr double kRadius_mm = 14, kPixel_mm = 0.6 * 300 / 512;  // at the isocentre
 
-constexpr double kRadius_mm = 14;
+const View kFrontal = view_of("frontal", radiograph::camera(0));
 
-View frontal() {
-  View view;
-  view.name = "frontal";
-  view.camera = radiograph::camera(0);
-  return view;
+ShaftLines borders(double radius_mm = kRadius_mm) {
+  return tube::borders(kFrontal.camera, {0, 0, 0}, Vector3d::UnitZ(), radius_mm, 100, 400);
 }
+/// A cylinder along the world's z axis, shifted in the image.
+Truth shifted(double x_mm) { return {{"world", "model", Matrix3d::Identity(), {x_mm, 0, 0}}}; }
 
-struct Bone {
+Value compared(const ShaftLines& lines, const List<Truth>& truths, const Context& context = {}) {
   List<Mesh> models;
-  List<Truth> truths;
-};
-
-/// A cylinder along the world's z axis, at its true place.
-Bone bone() {
-  Bone bone;
-  bone.models.add("distal", tube::cylinder(kRadius_mm, 200));
-  Truth truth;
-  truth.world_from_model = {"world", "model"};
-  bone.truths.add("distal", truth);
-  return bone;
-}
-
-ShaftLines borders(const View& view, double radius_mm = kRadius_mm) {
-  return tube::borders(view.camera, {0, 0, 0}, Eigen::Vector3d::UnitZ(), radius_mm, 100, 400);
-}
-
-marrow::Value compared(const ShaftLines& lines, const List<Mesh>& models, const List<Truth>& truths,
-                       const Listener& listener) {
-  return shipped::call("evaluate.shaft_lines",
-                       {{"lines", shipped::item(lines)},
-                        {"view", shipped::item(frontal())},
-                        {"models", shipped::list(models, "fragment")},
-                        {"truths", shipped::list(truths, "fragment")}},
-                       {}, listener.context)
+  if (!truths.empty())
+    for (const std::string name : {"distal", "far", "near", "unknown"})
+      models.add(name, tube::cylinder(kRadius_mm, 200));
+  return call("evaluate.shaft_lines",
+              {{"lines", item(lines)},
+               {"view", item(kFrontal)},
+               {"models", list(models, "fragment")},
+               {"truths", list(truths, "fragment")}},
+              {}, context)
       .at("metrics");
 }
-
-double figure(const ShaftLines& lines, const std::string& name) {
-  const Listener listener;
-  const Bone truth = bone();
-  const auto metrics = compared(lines, truth.models, truth.truths, listener);
-  return metrics.is_absent() ? std::nan("") : shipped::figure(metrics, name);
-}
+Figures errors(const ShaftLines& lines) { return figures_of(compared(lines, named("distal", shifted(0)))); }
 
 TEST(EvaluateShaftLines, ExactBordersHaveNoError) {
-  const ShaftLines lines = borders(frontal());
-  EXPECT_LT(figure(lines, "border_angle_deg"), 0.01);
-  EXPECT_LT(figure(lines, "border_offset_mm"), 0.01);
-  EXPECT_LT(figure(lines, "worst_mm"), 0.02);
-  EXPECT_LT(figure(lines, "axis_offset_mm"), 0.01);
-  EXPECT_NEAR(figure(lines, "width_error_mm"), 0, 0.02);
+  const Figures found = errors(borders());
+  expect_figures(found, {{"border_angle_deg", 0}, {"border_offset_mm", 0}, {"axis_offset_mm", 0}}, 0.01);
+  expect_figures(found, {{"worst_mm", 0}, {"width_error_mm", 0}}, 0.02);
 }
 
 TEST(EvaluateShaftLines, NarrowerOnesLieInside) {
-  const ShaftLines lines = borders(frontal(), kRadius_mm - 0.5);
-  EXPECT_NEAR(figure(lines, "border_offset_mm"), 0.5, 0.02);
-  EXPECT_NEAR(figure(lines, "width_error_mm"), -1, 0.04);
-  EXPECT_LT(figure(lines, "axis_offset_mm"), 0.01);
+  const Figures found = errors(borders(kRadius_mm - 0.5));
+  expect_figures(found, {{"border_offset_mm", 0.5}}, 0.02);
+  expect_figures(found, {{"width_error_mm", -1}}, 0.04);
+  expect_figures(found, {{"axis_offset_mm", 0}}, 0.01);
 }
 
 TEST(EvaluateShaftLines, APairThatIsOnePercentTooWideSaysSo) {
-  const ShaftLines lines = borders(frontal(), 1.01 * kRadius_mm);
-  EXPECT_NEAR(figure(lines, "width_error_mm"), 0.28, 0.01);
-  EXPECT_NEAR(figure(lines, "true_width_mm"), 28, 0.02);
+  const Figures found = errors(borders(1.01 * kRadius_mm));
+  expect_figures(found, {{"width_error_mm", 0.28}}, 0.01);
+  expect_figures(found, {{"true_width_mm", 28}}, 0.02);
+}
+
+/// Turned about its middle, and shifted.
+LineSegment moved(const LineSegment& border, double turn_deg, const Vector2d& shift_px = {0, 0}) {
+  const Vector2d middle = 0.5 * (border.from_px + border.to_px) + shift_px,
+                 half = Eigen::Rotation2Dd(radians(turn_deg)) * (0.5 * (border.to_px - border.from_px));
+  return {middle - half, middle + half};
 }
 
 TEST(EvaluateShaftLines, OneThatIsTurnedSaysByHowMuch) {
-  ShaftLines lines = borders(frontal());
-  const Eigen::Vector2d middle = 0.5 * (lines.left.from_px + lines.left.to_px);
-  for (Eigen::Vector2d* end : {&lines.left.from_px, &lines.left.to_px})
-    *end = middle + Eigen::Rotation2Dd(marrow::radians(1)) * (*end - middle);
-  EXPECT_NEAR(figure(lines, "border_angle_deg"), 1, 0.02);
-  EXPECT_NEAR(figure(lines, "axis_angle_deg"), 0.5, 0.02);
-  EXPECT_NEAR(figure(lines, "worst_mm"), 150 * std::sin(marrow::radians(1)) * 0.6 * 300 / 512, 0.05);
+  ShaftLines lines = borders();
+  lines.left = moved(lines.left, 1);
+  const Figures found = errors(lines);
+  expect_figures(found, {{"border_angle_deg", 1}, {"axis_angle_deg", 0.5}}, 0.02);
+  expect_figures(found, {{"worst_mm", 150 * std::sin(radians(1)) * kPixel_mm}}, 0.05);
 }
 
 TEST(EvaluateShaftLines, LengthsAndWidths) {
-  ShaftLines lines = borders(frontal());
+  ShaftLines lines = borders();
   lines.log_likelihood = -3.5;
-  const double pixel_mm = 0.6 * 300 / 512;
-  EXPECT_NEAR(figure(lines, "length_mm"), pixel_mm * (lines.left.to_px - lines.left.from_px).norm(), 0.05)
-      << "the outline is 0.3 mm before the axis, which is at 600 mm";
-  EXPECT_NEAR(figure(lines, "true_width_mm"), pixel_mm * (lines.left.from_px - lines.right.from_px).norm(), 0.02);
-  EXPECT_EQ(figure(lines, "log_likelihood"), -3.5);
+  const Figures found = errors(lines);
+  // The outline is 0.3 mm before the axis, which is at 600 mm.
+  expect_figures(found, {{"length_mm", kPixel_mm * (lines.left.to_px - lines.left.from_px).norm()}}, 0.05);
+  expect_figures(found, {{"true_width_mm", kPixel_mm * (lines.left.from_px - lines.right.from_px).norm()}}, 0.02);
+  EXPECT_EQ(found.at("log_likelihood"), -3.5);
 }
 
 TEST(EvaluateShaftLines, TheWorseOfTheTwoBordersCounts) {
-  // The right one 0.9 mm outwards and turned by half a degree to the other side.
+  // One of them 0.9 mm outwards and turned by half a degree.
   for (const bool left : {true, false}) {
-    ShaftLines lines = borders(frontal());
-    marrow::LineSegment& moved = left ? lines.left : lines.right;
-    const double shift_px = 0.9 / (0.6 * 300 / 512);
-    const Eigen::Vector2d outwards = (left ? 1 : -1) * (lines.left.from_px - lines.right.from_px).normalized();
-    const Eigen::Vector2d middle = 0.5 * (moved.from_px + moved.to_px) + shift_px * outwards;
-    const Eigen::Vector2d half = Eigen::Rotation2Dd(marrow::radians(-0.5)) * (0.5 * (moved.to_px - moved.from_px));
-    moved = {middle - half, middle + half};
-    EXPECT_NEAR(figure(lines, "border_offset_mm"), 0.9, 0.02);
-    EXPECT_NEAR(figure(lines, "border_angle_deg"), 0.5, 0.02);
-    EXPECT_NEAR(figure(lines, "axis_offset_mm"), 0.45, 0.02);
-    EXPECT_NEAR(figure(lines, "axis_angle_deg"), 0.25, 0.02);
-    EXPECT_NEAR(figure(lines, "width_error_mm"), 0.9, 0.04);
-    EXPECT_NEAR(figure(lines, "worst_mm"), 0.9 + 150 * std::sin(marrow::radians(0.5)) * 0.6 * 300 / 512, 0.05);
+    ShaftLines lines = borders();
+    const Vector2d outwards = (left ? 1 : -1) * (lines.left.from_px - lines.right.from_px).normalized();
+    LineSegment& border = left ? lines.left : lines.right;
+    border = moved(border, -0.5, 0.9 / kPixel_mm * outwards);
+    const Figures found = errors(lines);
+    expect_figures(
+        found,
+        {{"border_offset_mm", 0.9}, {"border_angle_deg", 0.5}, {"axis_offset_mm", 0.45}, {"axis_angle_deg", 0.25}},
+        0.02);
+    expect_figures(found, {{"width_error_mm", 0.9}}, 0.04);
+    expect_figures(found, {{"worst_mm", 0.9 + 150 * std::sin(radians(0.5)) * kPixel_mm}}, 0.05);
   }
 }
 
 TEST(EvaluateShaftLines, AgainstTheFragmentWhoseOutlineIsNearest) {
-  Listener listener;
-  Bone truth = bone();
-  for (const char* name : {"far", "near", "unknown"}) {
-    truth.models.add(name, tube::cylinder(kRadius_mm, 200));
-    Truth shifted;
-    shifted.world_from_model = {"world", "model"};
-    shifted.world_from_model.translation_mm.x() = name == std::string("near") ? 0.3 : 4;
-    if (name != std::string("unknown")) truth.truths.add(name, shifted);
-  }
-  Truth off;
-  off.world_from_model = {"world", "model"};
-  off.world_from_model.translation_mm.x() = -2;
-  List<Truth> truths;
-  truths.add("distal", off);
-  truths.add("far", truth.truths[1]);
-  truths.add("near", truth.truths[2]);
-  const auto metrics = compared(borders(frontal()), truth.models, truths, listener);
+  const auto metrics = compared(borders(), named("distal", shifted(-2), "far", shifted(4), "near", shifted(0.3)));
   ASSERT_FALSE(metrics.is_absent());
-  const marrow::Metric& second = metrics.as<marrow::Metrics>().items[1];
+  const Metric& second = metrics.as<Metrics>().items[1];
   EXPECT_NEAR(second.value, 0.3, 0.02) << second.name;
 }
 
 TEST(EvaluateShaftLines, WithoutABoneThereTheyCannotBeCompared) {
-  Listener listener;
-  EXPECT_TRUE(compared(borders(frontal()), {}, {}, listener).is_absent());
-  ASSERT_EQ(listener.warnings.size(), 1u);
-  EXPECT_EQ(listener.warnings[0],
-            "view 'frontal': no fragment of known pose lies where the pair of borders was found, so there is nothing "
-            "to compare it with");
+  Heard heard;
+  EXPECT_TRUE(compared(borders(), {}, heard.context).is_absent());
+  EXPECT_EQ(heard.warnings,
+            Strings{"view 'frontal': no fragment of known pose lies where the pair of borders was found, so there is "
+                    "nothing to compare it with"});
 }
 
-}  // namespace shaft_lines_test
+}  // namespace marrow::test::shaft_lines_test

@@ -1,31 +1,25 @@
 // SPDX-License-Identifier: Apache-2.0
 // Cylinders, cones and boxes, whose borders are known exactly. An error of 1 % of the width would be 0.28 mm.
 #include "plugins/evaluate/true_borders.hpp"
-
-#include <gtest/gtest.h>
-
-#include <random>
-
-#include "tests/framework/domain/shapes.hpp"
 #include "tests/plugins/edges/radiograph.hpp"
 #include "tests/plugins/evaluate/cone.hpp"
 
-namespace true_borders_test {
+namespace marrow::test::true_borders_test {
 
-using marrow::LineSegment, marrow::Mesh, marrow::RigidTransform, marrow::ShaftLines, tube::posed;
+using tube::posed;
 
 constexpr double kRadius_mm = 14, kPixel_mm = 0.6 * 300 / 512;  // at the isocentre
 constexpr double kLimit_mm = 0.01;
 
 Mesh cylinder(double half_mm = 150) {
   return tube::mesh(
-      half_mm, [](double, double) { return kRadius_mm; }, [](double) { return Eigen::Vector3d(0, 0, 0); }, 360, 60);
+      half_mm, [](double, double) { return kRadius_mm; }, [](double) { return Vector3d(0, 0, 0); }, 360, 60);
 }
 
 /// The farthest that an end of one segment is from the line through the other, in mm at the isocentre.
 double apart_mm(const LineSegment& one, const LineSegment& other) {
-  const Eigen::Vector2d way = (other.to_px - other.from_px).normalized();
-  const auto off = [&](const Eigen::Vector2d& p) {
+  const Vector2d way = (other.to_px - other.from_px).normalized();
+  const auto off = [&](const Vector2d& p) {
     return std::abs(way.x() * (p - other.from_px).y() - way.y() * (p - other.from_px).x());
   };
   return kPixel_mm * std::max(off(one.from_px), off(one.to_px));
@@ -40,16 +34,15 @@ TEST(TrueBorders, OfACylinderAreTheLinesThatTouchIt) {
   std::uniform_real_distribution<double> unit(-1, 1);
   double worst = 0;
   for (int i = 0; i < 40; ++i) {
-    const marrow::Camera camera = radiograph::camera(180 * unit(random));
+    const Camera camera = radiograph::camera(180 * unit(random));
     const RigidTransform pose = posed({15 * unit(random), 15 * unit(random), 90 * unit(random)},
                                       {30 * unit(random), 30 * unit(random), 20 * unit(random)});
     const ShaftLines exact = tube::borders(camera, pose.translation_mm, pose.rotation.col(2), kRadius_mm, 100, 400);
     const auto borders = true_borders::borders_beside(exact, model, pose, camera, 1);
     ASSERT_TRUE(borders);
     worst = std::max(worst, worst_mm(*borders, exact));
-    const Eigen::Vector2d between =
-        0.5 * (exact.right.from_px + exact.right.to_px - exact.left.from_px - exact.left.to_px);
-    const Eigen::Vector2d along =
+    const Vector2d between = 0.5 * (exact.right.from_px + exact.right.to_px - exact.left.from_px - exact.left.to_px);
+    const Vector2d along =
         (exact.left.from_px + exact.right.from_px - exact.left.to_px - exact.right.to_px).normalized();
     EXPECT_NEAR(kPixel_mm * borders->width_px, kPixel_mm * std::abs(along.x() * between.y() - along.y() * between.x()),
                 kLimit_mm);
@@ -61,13 +54,13 @@ TEST(TrueBorders, OfACylinderAreTheLinesThatTouchIt) {
 TEST(TrueBorders, OfAConeAreTheLinesThatTouchIt) {
   for (const double slope : {-0.08, -0.03, 0.03, 0.08}) {
     const Mesh model = tube::mesh(
-        150, [=](double z, double) { return kRadius_mm + slope * z; }, [](double) { return Eigen::Vector3d(0, 0, 0); },
-        360, 60);
+        150, [=](double z, double) { return kRadius_mm + slope * z; }, [](double) { return Vector3d(0, 0, 0); }, 360,
+        60);
     for (const double angle : {0.0, 35.0, 90.0}) {
-      const marrow::Camera camera = radiograph::camera(angle);
+      const Camera camera = radiograph::camera(angle);
       const RigidTransform pose = posed({8, -6, 20}, {12, -25, 5});
-      const cone::Cone known{pose * Eigen::Vector3d(0, 0, -kRadius_mm / slope),
-                             (slope > 0 ? 1 : -1) * pose.rotation.col(2), std::atan(std::abs(slope))};
+      const cone::Cone known{pose * Vector3d(0, 0, -kRadius_mm / slope), (slope > 0 ? 1 : -1) * pose.rotation.col(2),
+                             std::atan(std::abs(slope))};
       const ShaftLines exact = cone::borders(camera, known, 120, 380);
       const auto borders = true_borders::borders_beside(exact, model, pose, camera, 1);
       ASSERT_TRUE(borders);
@@ -78,10 +71,10 @@ TEST(TrueBorders, OfAConeAreTheLinesThatTouchIt) {
 
 // Those of a box are the images of its edges, to the last digits.
 TEST(TrueBorders, OfABoxAreItsEdges) {
-  const marrow::Camera camera = radiograph::camera(0);  // along +y
-  const Mesh model = marrow::test::box({0, 0, 0}, {20, 30, 200});
+  const Camera camera = radiograph::camera(0);  // along +y
+  const Mesh model = box({0, 0, 0}, {20, 30, 200});
   const auto edge = [&](double x) {
-    return LineSegment{marrow::project(camera, {x, -15, 50}), marrow::project(camera, {x, -15, -50})};
+    return LineSegment{project(camera, {x, -15, 50}), project(camera, {x, -15, -50})};
   };
   ShaftLines edges;
   edges.left = edge(10), edges.right = edge(-10);  // they run down
@@ -92,16 +85,15 @@ TEST(TrueBorders, OfABoxAreItsEdges) {
 }
 
 TEST(TrueBorders, DoNotDependOnThePairBeside) {
-  const marrow::Camera camera = radiograph::camera(0);
+  const Camera camera = radiograph::camera(0);
   const RigidTransform pose = posed({5, -4, 0}, {6, -9, 0});
   const ShaftLines exact = tube::borders(camera, pose.translation_mm, pose.rotation.col(2), kRadius_mm, 100, 400);
   for (const double turn_deg : {-3.0, 0.0, 3.0})
     for (const double shift_px : {-20.0, 20.0}) {
       ShaftLines pair = exact;
       for (LineSegment* border : {&pair.left, &pair.right})
-        for (Eigen::Vector2d* end : {&border->from_px, &border->to_px})
-          *end = Eigen::Rotation2Dd(marrow::radians(turn_deg)) * (*end - Eigen::Vector2d(256, 256)) +
-                 Eigen::Vector2d(256 + shift_px, 256);
+        for (Vector2d* end : {&border->from_px, &border->to_px})
+          *end = Eigen::Rotation2Dd(radians(turn_deg)) * (*end - Vector2d(256, 256)) + Vector2d(256 + shift_px, 256);
       const auto borders = true_borders::borders_beside(pair, cylinder(), pose, camera, 3 * kPixel_mm);
       ASSERT_TRUE(borders);
       EXPECT_LT(worst_mm(*borders, exact), kLimit_mm);
@@ -111,7 +103,7 @@ TEST(TrueBorders, DoNotDependOnThePairBeside) {
 // A fragment's surface ends where it broke, and all vertices of the bone may still be in its list. In the last pixels
 // before an end that leans, the outline is that of the break.
 TEST(TrueBorders, OfASurfaceThatEndsAreThoseOfItsPart) {
-  const marrow::Camera camera = radiograph::camera(90);
+  const Camera camera = radiograph::camera(90);
   const RigidTransform pose = posed({3, 7, 0}, {4, 5, 0});
   const ShaftLines exact = tube::borders(camera, pose.translation_mm, pose.rotation.col(2), kRadius_mm, 100, 400);
   Mesh part = cylinder();
@@ -124,8 +116,8 @@ TEST(TrueBorders, OfASurfaceThatEndsAreThoseOfItsPart) {
 TEST(TrueBorders, WhatFlaresFartherThanTheToleranceIsNoShaft) {
   const Mesh model = tube::mesh(
       100, [](double z, double) { return kRadius_mm + std::max(0.0, z - 30); },
-      [](double) { return Eigen::Vector3d(0, 0, 0); }, 360, 400);
-  const marrow::Camera camera = radiograph::camera(0);
+      [](double) { return Vector3d(0, 0, 0); }, 360, 400);
+  const Camera camera = radiograph::camera(0);
   const ShaftLines exact = tube::borders(camera, {0, 0, 0}, {0, 0, 1}, kRadius_mm, 140, 400);  // z up to 41 mm
   const RigidTransform pose = posed({0, 0, 0}, {0, 0, 0});
   const auto within = [&](double tolerance_mm) {
@@ -137,9 +129,9 @@ TEST(TrueBorders, WhatFlaresFartherThanTheToleranceIsNoShaft) {
 }
 
 TEST(TrueBorders, NeedTheSurfaceInAThirdOfTheStretch) {
-  const marrow::Camera camera = radiograph::camera(0);
+  const Camera camera = radiograph::camera(0);
   const ShaftLines pair = tube::borders(camera, {0, 0, 0}, {0, 0, 1}, kRadius_mm, 56, 456);  // 140.6 mm
-  const auto shown = [&](double half_mm, const Eigen::Vector3d& at) {
+  const auto shown = [&](double half_mm, const Vector3d& at) {
     return true_borders::borders_beside(pair, cylinder(half_mm), posed({0, 0, 0}, at), camera, 3 * kPixel_mm)
         .has_value();
   };
@@ -150,4 +142,4 @@ TEST(TrueBorders, NeedTheSurfaceInAThirdOfTheStretch) {
   EXPECT_FALSE(true_borders::borders_beside({}, cylinder(), posed({0, 0, 0}, {0, 0, 0}), camera, 3 * kPixel_mm));
 }
 
-}  // namespace true_borders_test
+}  // namespace marrow::test::true_borders_test

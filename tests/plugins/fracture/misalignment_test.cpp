@@ -1,27 +1,21 @@
 // SPDX-License-Identifier: Apache-2.0
 // The motions are made from the right values: a hinge, an angle in a plane, a turn about the shaft.
-#include <gtest/gtest.h>
-
-#include <cmath>
-
 #include "marrow/fracture/fracture_site.hpp"
 #include "tests/plugins/fracture/fragments.hpp"
 
-namespace misalignment_test {
+namespace marrow::test::misalignment_test {
 
 using namespace broken_shaft;
-using marrow::RigidTransform, marrow::kPi;
-using shipped::figure;
 
 /// The fragment's own axes. Its oblique end tilts them by 1.5 degrees.
-const Eigen::Matrix3d kAxes = fragment_frame(*models().find("distal")).axes;
+const Matrix3d kAxes = fragment_frame(*models().find("distal")).axes;
 const Vector3d kLeft = kAxes.col(0), kBack = kAxes.col(1), kUp = kAxes.col(2);
 
 /// How near the fracture's middle is found on the surfaces.
 constexpr double kNear_mm = 0.1;
 
-marrow::Value misalignment(const RigidTransform& motion, const shipped::Options& options = {{"side", "left"}}) {
-  return shipped::call("fracture.misalignment", inputs(poses(motion)), options).at("metrics");
+Value misalignment(const RigidTransform& motion, const Options& options = {{"side", "left"}}) {
+  return call("fracture.misalignment", inputs(poses(motion)), options).at("metrics");
 }
 
 TEST(Misalignment, AHingeWithTheBoneEndsInContactIsNoShift) {
@@ -33,8 +27,8 @@ TEST(Misalignment, AHingeWithTheBoneEndsInContactIsNoShift) {
 }
 
 TEST(Misalignment, AngulationAndTorsionDoNotMix) {
-  const Eigen::Matrix3d tilt = turn(15, kAxes * Vector3d(0.6, 0.8, 0));
-  for (const Eigen::Matrix3d& whole : {Eigen::Matrix3d(tilt * turn(40, kUp)), Eigen::Matrix3d(turn(40, kUp) * tilt)}) {
+  const Matrix3d tilt = turn(15, kAxes * Vector3d(0.6, 0.8, 0));
+  for (const Matrix3d& whole : {Matrix3d(tilt * turn(40, kUp)), Matrix3d(turn(40, kUp) * tilt)}) {
     const auto found = misalignment(motion(whole));
     EXPECT_NEAR(figure(found, "angulation_deg"), 15, 0.1);
     EXPECT_NEAR(figure(found, "internal_torsion_deg"), -40, 0.1) << "the front turns to the left, which is outwards";
@@ -50,7 +44,7 @@ TEST(Misalignment, SignsAreThoseOfTheirNamesOnBothSides) {
     std::string name;
     double left, right;
   };
-  const auto shift = [](const Vector3d& by_mm) { return motion(Eigen::Matrix3d::Identity(), Vector3d::Zero(), by_mm); };
+  const auto shift = [](const Vector3d& by_mm) { return motion(Matrix3d::Identity(), Vector3d::Zero(), by_mm); };
   // A turn of 8 degrees about the axis to the back brings the lower end to the right: inwards on the left side.
   // One about the axis to the left brings the lower end to the back, with the apex in front.
   const std::vector<Case> cases{
@@ -59,8 +53,8 @@ TEST(Misalignment, SignsAreThoseOfTheirNamesOnBothSides) {
       {shift(5 * kBack), "anterior_shift_mm", -5, -5},       {shift(5 * kUp), "shortening_mm", 5, 5}};
   for (const Case& one : cases)
     for (const std::string side : {"left", "right"}) {
-      const marrow::Value found = misalignment(one.motion, {{"side", side}});
-      for (const marrow::Metric& metric : found.as<marrow::Metrics>().items) {
+      const Value found = misalignment(one.motion, {{"side", side}});
+      for (const Metric& metric : found.as<Metrics>().items) {
         if (metric.name == "angulation_deg" || metric.name == "shift_mm") continue;
         const double right = metric.name == one.name ? (side == "left" ? one.left : one.right) : 0;
         EXPECT_NEAR(metric.value, right, 0.15) << one.name << ", " << side << ": " << metric.name;
@@ -78,12 +72,14 @@ TEST(Misalignment, SignsAreThoseOfTheirNamesOnBothSides) {
 TEST(Misalignment, PlanesAreThoseOfTheXRays) {
   const double frontal = 12 * kPi / 180, sagittal = -20 * kPi / 180;
   const Vector3d shaft = Vector3d(std::tan(frontal), std::tan(sagittal), 1).normalized();
-  const Eigen::Matrix3d swing = Eigen::Quaterniond::FromTwoVectors(kUp, kAxes * shaft).toRotationMatrix();
+  const Matrix3d swing = Eigen::Quaterniond::FromTwoVectors(kUp, kAxes * shaft).toRotationMatrix();
   const auto found = misalignment(motion(swing * turn(-25, kUp), kFracture_mm, kAxes * Vector3d(-6, 2, -4)));
-  EXPECT_NEAR(figure(found, "varus_deg"), 12, 0.1);
-  EXPECT_NEAR(figure(found, "procurvatum_deg"), 20, 0.1);
-  EXPECT_NEAR(figure(found, "angulation_deg"), std::acos(shaft.z()) * 180 / kPi, 0.1);
-  EXPECT_NEAR(figure(found, "internal_torsion_deg"), 25, 0.1);
+  expect_figures(found,
+                 {{"varus_deg", 12},
+                  {"procurvatum_deg", 20},
+                  {"angulation_deg", std::acos(shaft.z()) * 180 / kPi},
+                  {"internal_torsion_deg", 25}},
+                 0.1);
   EXPECT_NEAR(figure(found, "medial_shift_mm"), 6, 2 * kNear_mm);
   EXPECT_NEAR(figure(found, "anterior_shift_mm"), -2, 2 * kNear_mm);
   EXPECT_NEAR(figure(found, "shift_mm"), std::hypot(6, 2), 2 * kNear_mm);
@@ -91,97 +87,89 @@ TEST(Misalignment, PlanesAreThoseOfTheXRays) {
 }
 
 TEST(Misalignment, NoneWhereNothingMoved) {
-  const auto found = misalignment(motion(Eigen::Matrix3d::Identity()));
-  for (const marrow::Metric& metric : found.as<marrow::Metrics>().items)
-    EXPECT_NEAR(metric.value, 0, 1e-9) << metric.name;
+  const auto found = misalignment(motion(Matrix3d::Identity()));
+  for (const Metric& metric : found.as<Metrics>().items) EXPECT_NEAR(metric.value, 0, 1e-9) << metric.name;
 }
 
 TEST(Misalignment, IsOfTheDistalFragmentWhicheverIsNamedFirst) {
   const RigidTransform moved = motion(turn(8, kBack) * turn(20, kUp), kFracture_mm, {1, 2, 3});
   const auto one = misalignment(moved),
              other = misalignment(moved, {{"side", "left"}, {"moved", "proximal"}, {"reference", "distal"}});
-  for (const marrow::Metric& metric : one.as<marrow::Metrics>().items)
+  for (const Metric& metric : one.as<Metrics>().items)
     EXPECT_NEAR(metric.value, figure(other, metric.name), 1e-9) << metric.name;
 }
 
 TEST(Misalignment, TheLimbMayLieOtherwiseInTheCt) {
   // An arm above the head: its end is up, and its front is still the patient's front.
   const RigidTransform moved = motion(turn(8, kBack));
-  const auto found = misalignment(moved, {{"side", "left"}, {"up", std::vector<double>{0, 0, -1}}});
+  const auto found = misalignment(moved, {{"side", "left"}, {"up", Numbers{0, 0, -1}}});
   // Now the upper fragment is the distal one. Relative to it the other fragment has turned by 8 degrees about the axis
   // to the back, so it has turned by -8 degrees itself. Seen along the limb, left and right have changed with up and
   // down.
   EXPECT_NEAR(figure(found, "varus_deg"), -8, 0.1);
-  EXPECT_EQ(shipped::refusal("fracture.misalignment", inputs(poses(moved)), {{"up", std::vector<double>{0, 1, 0}}}),
+  EXPECT_EQ(refusal("fracture.misalignment", inputs(poses(moved)), {{"up", Numbers{0, 1, 0}}}),
             "'front' and 'up' must be two different directions of the CT, such as [0, -1, 0] and [0, 0, 1]");
-  EXPECT_EQ(shipped::refusal("fracture.misalignment", inputs(poses(moved)),
-                             {{"up", std::vector<double>{0, 1, 0}}, {"front", std::vector<double>{-1, 0, 0}}}),
-            "the bone's long axis runs from the patient's left to the right in the CT, so its frontal plane is not "
-            "known; give the 'front' and 'up' of this limb in the CT");
+  EXPECT_EQ(
+      refusal("fracture.misalignment", inputs(poses(moved)), {{"up", Numbers{0, 1, 0}}, {"front", Numbers{-1, 0, 0}}}),
+      "the bone's long axis runs from the patient's left to the right in the CT, so its frontal plane is not "
+      "known; give the 'front' and 'up' of this limb in the CT");
 }
 
 /// Half of the tubes' facing ends is exactly the fracture's middle, by symmetry.
 TEST(Misalignment, TheFractureIsWhereTheSurfacesFaceEachOther) {
-  const Vector3d found = marrow::fracture::middle_of_fracture_mm(*models().find("distal"), "distal",
-                                                                 *models().find("proximal"), "proximal");
+  const Vector3d found =
+      fracture::middle_of_fracture_mm(*models().find("distal"), "distal", *models().find("proximal"), "proximal");
   EXPECT_LT((found - kFracture_mm).norm(), kNear_mm) << found.transpose();
-  marrow::Mesh far = *models().find("distal");
+  Mesh far = *models().find("distal");
   for (Vector3d& vertex : far.vertices_mm) vertex.z() -= 60;
-  marrow::List<marrow::Mesh> apart;
-  apart.add("proximal", *models().find("proximal"));
-  apart.add("distal", far);
-  shipped::Inputs given = inputs(poses(motion(turn(8, kBack))));
-  given["models"] = shipped::list(apart, "fragment");
-  EXPECT_EQ(shipped::refusal("fracture.misalignment", given),
+  Inputs given = inputs(poses(motion(turn(8, kBack))));
+  given["models"] = per_fragment("proximal", *models().find("proximal"), "distal", far);
+  EXPECT_EQ(refusal("fracture.misalignment", given),
             "the surfaces of 'distal' and 'proximal' are nowhere within 20 mm of each other in the CT, so they show no "
             "fracture between them; are they two sides of one fracture?");
 }
 
 TEST(Misalignment, ThePlaceOfTheFractureCanBeGiven) {
-  shipped::Inputs given = inputs(poses(motion(turn(10, kBack))));
+  Inputs given = inputs(poses(motion(turn(10, kBack))));
   given.erase("models");
-  EXPECT_EQ(shipped::refusal("fracture.misalignment", given),
+  EXPECT_EQ(refusal("fracture.misalignment", given),
             "where the fracture is in the CT is not known, so there is no shift and no shortening; wire the surfaces "
             "of both fragments to 'models', or give the fracture's middle as 'fracture_mm'");
-  const std::vector<double> at{kFracture_mm.x(), kFracture_mm.y(), kFracture_mm.z() + 50};
-  const auto found = shipped::call("fracture.misalignment", given, {{"fracture_mm", at}}).at("metrics");
+  const Numbers at{kFracture_mm.x(), kFracture_mm.y(), kFracture_mm.z() + 50};
+  const auto found = call("fracture.misalignment", given, {{"fracture_mm", at}}).at("metrics");
   EXPECT_NEAR(figure(found, "shift_mm"), 50 * std::sin(10 * kPi / 180), 0.05);
-  EXPECT_EQ(shipped::refusal("fracture.misalignment", given, {{"fracture_mm", std::vector<double>{1, 2}}}),
+  EXPECT_EQ(refusal("fracture.misalignment", given, {{"fracture_mm", Numbers{1, 2}}}),
             "'fracture_mm' takes one point of the CT, as [x, y, z], got 2 numbers");
 }
 
 TEST(Misalignment, AxesOfPosesThatHaveNoneComeFromTheSurface) {
   const auto given = poses(motion(turn(10, kBack), kFracture_mm, {0, 0, 3}));
-  const auto right = shipped::call("fracture.misalignment", inputs(given)).at("metrics"),
-             found = shipped::call("fracture.misalignment", inputs(without_axes(given))).at("metrics");
-  for (const marrow::Metric& metric : right.as<marrow::Metrics>().items)
+  const auto right = call("fracture.misalignment", inputs(given)).at("metrics"),
+             found = call("fracture.misalignment", inputs(without_axes(given))).at("metrics");
+  for (const Metric& metric : right.as<Metrics>().items)
     EXPECT_EQ(metric.value, figure(found, metric.name)) << metric.name;
-  shipped::Inputs without = inputs(without_axes(given));
+  Inputs without = inputs(without_axes(given));
   without.erase("models");
   EXPECT_EQ(
-      shipped::refusal("fracture.misalignment", without, {{"fracture_mm", std::vector<double>{0, 0, 0}}}),
+      refusal("fracture.misalignment", without, {{"fracture_mm", Numbers{0, 0, 0}}}),
       "the pose of 'distal' does not say where the fragment's middle is and how its long axis runs, as a matrix alone "
       "does not; wire the surfaces of both fragments to 'models', or give the node that reads the pose its model");
 }
 
 /// A distal fragment that is shorter than it is wide: the longest way through it is across the bone.
 TEST(Misalignment, AShortFragmentDoesNotTellTheLongAxis) {
-  marrow::List<marrow::Mesh> short_models;
-  marrow::Mesh wide = tube(-1, 12);
+  Mesh wide = tube(-1, 12);
   for (Vector3d& vertex : wide.vertices_mm) vertex.x() = 3 + 2.5 * (vertex.x() - 3);
-  short_models.add("proximal", *models().find("proximal"));
-  short_models.add("distal", wide);
-  const Eigen::Matrix3d of_proximal = fragment_frame(*models().find("proximal")).axes;
-  const Eigen::Matrix3d whole = turn(15, of_proximal.col(1)) * turn(40, of_proximal.col(2));
-  shipped::Inputs given = inputs(without_axes(poses(motion(whole))));
-  given["models"] = shipped::list(short_models, "fragment");
+  const Matrix3d of_proximal = fragment_frame(*models().find("proximal")).axes;
+  const Matrix3d whole = turn(15, of_proximal.col(1)) * turn(40, of_proximal.col(2));
+  Inputs given = inputs(without_axes(poses(motion(whole))));
+  given["models"] = per_fragment("proximal", *models().find("proximal"), "distal", wide);
   std::string said;
-  marrow::Context::Hooks hooks;
-  hooks.log = [&](std::string_view message, marrow::LogLevel level) {
-    if (level == marrow::LogLevel::warning) said = message;
+  Context::Hooks hooks;
+  hooks.log = [&](std::string_view message, LogLevel level) {
+    if (level == LogLevel::warning) said = message;
   };
-  const auto found =
-      shipped::call("fracture.misalignment", given, {{"side", "left"}}, marrow::Context(hooks)).at("metrics");
+  const auto found = call("fracture.misalignment", given, {{"side", "left"}}, Context(hooks)).at("metrics");
   EXPECT_NEAR(figure(found, "angulation_deg"), 15, 0.2);
   EXPECT_NEAR(figure(found, "internal_torsion_deg"), -40, 0.2);
   EXPECT_TRUE(said.starts_with("the long axes of the two fragments differ by ")) << said;
@@ -193,32 +181,32 @@ TEST(Misalignment, AShortFragmentDoesNotTellTheLongAxis) {
 
 TEST(Misalignment, IsSaidInWords) {
   std::string said;
-  marrow::Context::Hooks hooks;
-  hooks.log = [&](std::string_view message, marrow::LogLevel) { said = message; };
+  Context::Hooks hooks;
+  hooks.log = [&](std::string_view message, LogLevel) { said = message; };
   const auto say = [&](const RigidTransform& moved) {
-    shipped::call("fracture.misalignment", inputs(poses(moved)), {{"side", "right"}}, marrow::Context(hooks));
+    call("fracture.misalignment", inputs(poses(moved)), {{"side", "right"}}, Context(hooks));
     return said;
   };
   EXPECT_EQ(say(motion(turn(12, kBack) * turn(30, kUp), kFracture_mm, kAxes * Vector3d(5, 2, -3))),
             "the distal fragment beside the proximal one: 12.0 deg valgus, 30.0 deg internal torsion, 5.0 mm medial "
             "shift, 2.0 mm shift to the back, 3.0 mm lengthening");
-  EXPECT_EQ(say(motion(Eigen::Matrix3d::Identity())), "the distal fragment beside the proximal one: in place");
+  EXPECT_EQ(say(motion(Matrix3d::Identity())), "the distal fragment beside the proximal one: in place");
 }
 
 TEST(Misalignment, RefusesOtherFragments) {
-  const auto message = [](const marrow::List<marrow::Pose>& poses, const shipped::Options& options) {
-    return shipped::refusal("fracture.misalignment", inputs(poses), options);
+  const auto message = [](const List<Pose>& poses, const Options& options) {
+    return refusal("fracture.misalignment", inputs(poses), options);
   };
   const std::string distal = "distal", shaft = "shaft";
-  const auto given = poses(motion(Eigen::Matrix3d::Identity()));
+  const auto given = poses(motion(Matrix3d::Identity()));
   EXPECT_EQ(message(given, {{"moved", distal}, {"reference", shaft}}),
             "there is no pose of a fragment 'shaft', only of proximal, distal; name both fragments with moved and "
             "reference, and register both");
   EXPECT_EQ(message(given, {{"moved", distal}, {"reference", distal}}),
             "moved and reference both name 'distal'; they must be two fragments");
-  for (const auto frame : {&marrow::RigidTransform::source, &marrow::RigidTransform::target}) {
-    marrow::List<marrow::Pose> mixed;
-    marrow::Pose other = given[1];
+  for (const auto frame : {&RigidTransform::source, &RigidTransform::target}) {
+    List<Pose> mixed;
+    Pose other = given[1];
     other.world_from_model.*frame = "elsewhere";
     mixed.add("proximal", given[0]);
     mixed.add("distal", other);
@@ -227,4 +215,4 @@ TEST(Misalignment, RefusesOtherFragments) {
   }
 }
 
-}  // namespace misalignment_test
+}  // namespace marrow::test::misalignment_test

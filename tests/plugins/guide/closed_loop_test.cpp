@@ -1,16 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 // The guide with poses that are made up, without images: a robot that does what it is told, somewhere.
-#include <gtest/gtest.h>
-
 #include "marrow/domain/random.hpp"
 #include "marrow/guide/servo.hpp"
 #include "marrow/toolbox/robotics/guide_state.hpp"
 #include "marrow/toolbox/robotics/robot_state.hpp"
-#include "shipped.hpp"
+#include "tests/harness/node_test.hpp"
 
-namespace closed_loop_test {
+namespace marrow::test::closed_loop_test {
 
-using namespace marrow;
 using robot::GuideState;
 using robot::RobotReport;
 
@@ -35,7 +32,7 @@ SignedField field(double from_z, double to_z) {
   for (int z = 0; z < 81; ++z)
     for (int y = 0; y < 33; ++y)
       for (int x = 0; x < 33; ++x) {
-        const Eigen::Vector3d at = field.grid.point_from_index(Eigen::Vector3d(x, y, z));
+        const Vector3d at = field.grid.point_from_index(Vector3d(x, y, z));
         field.values_mm.push_back(float(
             std::max({std::abs(at.x()) - kHalf_mm, std::abs(at.y()) - kHalf_mm, from_z - at.z(), at.z() - to_z})));
       }
@@ -66,43 +63,43 @@ List<Pose> poses(const RigidTransform& place, double deviation_deg = 0.1, double
     pose.frame = fragment_frame(*models().find(name));
     pose.world_from_model = name == "distal" ? kProximal * place : kProximal;
     Vector6d deviation;
-    deviation << Eigen::Vector3d::Constant(radians(deviation_deg)), Eigen::Vector3d::Constant(deviation_mm);
+    deviation << Vector3d::Constant(radians(deviation_deg)), Vector3d::Constant(deviation_mm);
     pose.covariance = deviation.cwiseAbs2().asDiagonal();
     all.add(name, pose);
   }
   return all;
 }
 
-RigidTransform displaced(Eigen::Vector3d turn_deg, Eigen::Vector3d shift_mm) {
+RigidTransform displaced(Vector3d turn_deg, Vector3d shift_mm) {
   FragmentFrame frame = fragment_frame(*models().find("distal"));
   Vector6d motion;
   motion << turn_deg * radians(1), shift_mm;
   return moved({"ct", "ct"}, frame, motion);
 }
 
-shipped::Inputs inputs(const List<Pose>& poses, const GuideState& state = {}, const RobotReport& report = {}) {
+Inputs inputs(const List<Pose>& poses, const GuideState& state = {}, const RobotReport& report = {}) {
   return {{"poses", shipped::list(poses, "fragment")},
-          {"state", shipped::item(state)},
-          {"report", shipped::item(report)},
+          {"state", item(state)},
+          {"report", item(report)},
           {"fields", shipped::list(fields(), "fragment")},
           {"models", shipped::list(models(), "fragment")}};
 }
 
-Stop stop_of(const shipped::Outputs& outputs) { return outputs.at("stop").as<Stop>(); }
+Stop stop_of(const Outputs& outputs) { return outputs.at("stop").as<Stop>(); }
 
 /// The loop, closed by a robot that stands anywhere. Each pair's outputs.
-std::vector<shipped::Outputs> loop(const std::string& hand_eye, const Eigen::Vector3d& stand_deg) {
+std::vector<Outputs> loop(const std::string& hand_eye, const Vector3d& stand_deg) {
   RigidTransform robot_from_world{"robot", "world", rotation_from_vector(stand_deg * radians(1)), {20, -30, 25}};
   RobotReport report;
   RigidTransform place = displaced({6, -5, 9}, {8, -6, -10});
   GuideState state;
   Random random(5);
-  std::vector<shipped::Outputs> pairs;
+  std::vector<Outputs> pairs;
   for (int pair = 0; pair < 8; ++pair) {
     Vector6d noise;
     for (int k = 0; k < 6; ++k) noise[k] = random.normal() * (k < 3 ? radians(0.1) : 0.06);
     const RigidTransform seen = moved(place, fragment_frame(*models().find("distal")), noise);
-    pairs.push_back(shipped::call("guide.closed_loop", inputs(poses(seen), state, report), {{"hand_eye", hand_eye}}));
+    pairs.push_back(call("guide.closed_loop", inputs(poses(seen), state, report), {{"hand_eye", hand_eye}}));
     if (stop_of(pairs.back()).stops) break;
     state = pairs.back().at("state").as<GuideState>();
     report.done = pairs.back().at("motion").as<Pose>().world_from_model;
@@ -118,29 +115,26 @@ TEST(ClosedLoop, PosesWithoutAxesOfTheirOwnAreTakenAboutTheirSurfaces) {
   const List<Pose> own = poses(displaced({6, -5, 9}, {8, -6, -10}));
   List<Pose> from_files;
   for (std::size_t i = 0; i < own.size(); ++i) from_files.add(own.name(i), in_frame(own[i], FragmentFrame()));
-  const auto expected = shipped::call("guide.closed_loop", inputs(own)),
-             found = shipped::call("guide.closed_loop", inputs(from_files));
+  const auto expected = call("guide.closed_loop", inputs(own)), found = call("guide.closed_loop", inputs(from_files));
   const RigidTransform &one = expected.at("motion").as<Pose>().world_from_model,
                        &other = found.at("motion").as<Pose>().world_from_model;
   EXPECT_LT((one.rotation - other.rotation).norm(), 1e-9);
-  EXPECT_LT((one.translation_mm - other.translation_mm).norm(), 1e-6);
-  EXPECT_NEAR(shipped::figure(expected.at("metrics"), "shift_mm"), shipped::figure(found.at("metrics"), "shift_mm"),
-              1e-9);
+  EXPECT_LT(shift_between_mm(one, other), 1e-6);
+  EXPECT_NEAR(figure(expected.at("metrics"), "shift_mm"), figure(found.at("metrics"), "shift_mm"), 1e-9);
   const auto poses_one = expected.at("predicted").as_list<Pose>(), poses_other = found.at("predicted").as_list<Pose>();
   for (std::size_t i = 0; i < poses_one.size(); ++i)
     EXPECT_EQ(poses_one[i].frame.origin_mm, poses_other[i].frame.origin_mm) << poses_one.name(i);
 }
 
 TEST(ClosedLoop, ReducesTheFractureWhereverTheRobotStands) {
-  for (const Eigen::Vector3d& stand :
-       {Eigen::Vector3d(0, 5, 0), Eigen::Vector3d(60, -50, 40), Eigen::Vector3d(-100, 90, 60)}) {
+  for (const Vector3d& stand : {Vector3d(0, 5, 0), Vector3d(60, -50, 40), Vector3d(-100, 90, 60)}) {
     const auto pairs = loop("estimated", stand);
     EXPECT_TRUE(stop_of(pairs.back()).reason.starts_with("the fracture is reduced: ")) << stop_of(pairs.back()).reason;
     EXPECT_LE(pairs.size(), 7u);
-    EXPECT_LT(shipped::figure(pairs.back().at("metrics"), "rotation_deg"), 0.5);
-    EXPECT_LT(shipped::figure(pairs.back().at("metrics"), "shift_mm"), 0.5);
-    EXPECT_EQ(shipped::figure(pairs.back().at("metrics"), "images"), 2 * double(pairs.size()));
-    EXPECT_EQ(shipped::figure(pairs.back().at("metrics"), "reduced"), 1);
+    EXPECT_LT(figure(pairs.back().at("metrics"), "rotation_deg"), 0.5);
+    EXPECT_LT(figure(pairs.back().at("metrics"), "shift_mm"), 0.5);
+    EXPECT_EQ(figure(pairs.back().at("metrics"), "images"), 2 * double(pairs.size()));
+    EXPECT_EQ(figure(pairs.back().at("metrics"), "reduced"), 1);
     const RigidTransform none = pairs.back().at("motion").as<Pose>().world_from_model;
     EXPECT_TRUE(none.rotation.isIdentity() && none.translation_mm.isZero());
   }
@@ -156,22 +150,22 @@ TEST(ClosedLoop, AFixedPlaceThatIsWrongEndsWithAReason) {
 TEST(ClosedLoop, NoStepIsLargerThanItsLimits) {
   for (const std::string hand_eye : {"estimated", "broyden", "fixed"})
     for (const auto& pair : loop(hand_eye, {60, -50, 40})) {
-      EXPECT_LE(shipped::figure(pair.at("metrics"), "step_deg"), 15 + 1e-9);
-      EXPECT_LE(shipped::figure(pair.at("metrics"), "step_mm"), 25 + 1e-9);
+      EXPECT_LE(figure(pair.at("metrics"), "step_deg"), 15 + 1e-9);
+      EXPECT_LE(figure(pair.at("metrics"), "step_mm"), 25 + 1e-9);
     }
 }
 
 /// How far a step leads the fracture astray at most, if nothing is known of the robot's place. Then its direction
 /// counts as known to 1.5 rad and its place to 60 mm; the fracture lies 150 mm from the fragment's middle.
 double astray_mm(const Value& figures) {
-  const double turn = radians(shipped::figure(figures, "step_deg"));
-  return 1.5 * (shipped::figure(figures, "step_mm") + 150 * turn) + 60 * turn;
+  const double turn = radians(figure(figures, "step_deg"));
+  return 1.5 * (figure(figures, "step_mm") + 150 * turn) + 60 * turn;
 }
 
 TEST(ClosedLoop, TheFirstStepIsShortIfTheRobotMayStandAnywhere) {
   const auto first = [](double limit_mm, const std::string& hand_eye) {
-    return shipped::call("guide.closed_loop", inputs(poses(displaced({6, -5, 9}, {8, -6, -10}))),
-                         {{"hand_eye", hand_eye}, {"astray_mm", limit_mm}})
+    return call("guide.closed_loop", inputs(poses(displaced({6, -5, 9}, {8, -6, -10}))),
+                {{"hand_eye", hand_eye}, {"astray_mm", limit_mm}})
         .at("metrics");
   };
   EXPECT_NEAR(astray_mm(first(12, "estimated")), 12, 1e-6);
@@ -179,9 +173,8 @@ TEST(ClosedLoop, TheFirstStepIsShortIfTheRobotMayStandAnywhere) {
   EXPECT_GT(astray_mm(first(12, "fixed")), 20);
   // As far as the bones are apart, it may go astray in any case. The gap is 2 mm in the CT, and 10 mm more.
   const Value apart =
-      shipped::call("guide.closed_loop", inputs(poses(displaced({0, 0, 5}, {0, 0, -10}))), {{"astray_mm", 1.0}})
-          .at("metrics");
-  EXPECT_NEAR(shipped::figure(apart, "distance_mm"), 12, 1e-3);
+      call("guide.closed_loop", inputs(poses(displaced({0, 0, 5}, {0, 0, -10}))), {{"astray_mm", 1.0}}).at("metrics");
+  EXPECT_NEAR(figure(apart, "distance_mm"), 12, 1e-3);
   EXPECT_NEAR(astray_mm(apart), 12, 0.01);
 }
 
@@ -194,10 +187,7 @@ TEST(ClosedLoop, AfterBonesHavePressedItGoesBack) {
   pressed.is_pressed = true;
   const auto poses_now = poses(displaced({6, -5, 9}, {8, -6, -10}));
   const auto told = [&](const RobotReport& report) {
-    return shipped::call("guide.closed_loop", inputs(poses_now, state, report))
-        .at("motion")
-        .as<Pose>()
-        .world_from_model;
+    return output<Pose>("guide.closed_loop", "motion", inputs(poses_now, state, report)).world_from_model;
   };
   const RigidTransform none = told(pressed) * state.told;
   EXPECT_TRUE(none.rotation.isIdentity(1e-9) && none.translation_mm.isZero(1e-9));
@@ -213,16 +203,15 @@ TEST(ClosedLoop, AfterBonesHavePressedItPullsThemApartIfItKnowsHow) {
   RobotReport pressed;
   pressed.stopped = "the force would pass 400 N";
   pressed.is_pressed = true;
-  const auto pair =
-      shipped::call("guide.closed_loop", inputs(poses(displaced({6, -5, 9}, {8, -6, -10})), state, pressed));
+  const auto pair = call("guide.closed_loop", inputs(poses(displaced({6, -5, 9}, {8, -6, -10})), state, pressed));
   EXPECT_TRUE(stop_of(pair).reason.starts_with("distract: ")) << stop_of(pair).reason;
-  EXPECT_NEAR(shipped::figure(pair.at("metrics"), "step_mm"), 4, 1e-6);
-  EXPECT_EQ(shipped::figure(pair.at("metrics"), "step_deg"), 0);
+  EXPECT_NEAR(figure(pair.at("metrics"), "step_mm"), 4, 1e-6);
+  EXPECT_EQ(figure(pair.at("metrics"), "step_deg"), 0);
 }
 
 TEST(ClosedLoop, FragmentsThatOverlapAreMovedApart) {
-  const auto pair = shipped::call("guide.closed_loop", inputs(poses(displaced({0, 0, 0}, {9, 0, 10}))));
-  EXPECT_LT(shipped::figure(pair.at("metrics"), "distance_mm"), 0);
+  const auto pair = call("guide.closed_loop", inputs(poses(displaced({0, 0, 0}, {9, 0, 10}))));
+  EXPECT_LT(figure(pair.at("metrics"), "distance_mm"), 0);
   // Away from the proximal fragment, which lies at larger z of its own frame.
   const RigidTransform told = pair.at("motion").as<Pose>().world_from_model;
   EXPECT_LT((kProximal.rotation.transpose() * told.translation_mm).z(), -1);
@@ -230,8 +219,7 @@ TEST(ClosedLoop, FragmentsThatOverlapAreMovedApart) {
 
 TEST(ClosedLoop, EndsWhereTheImagesShowNoMore) {
   const auto reason = [](double turn_deg, double shift_mm) {
-    return stop_of(shipped::call("guide.closed_loop",
-                                 inputs(poses(displaced({0, 0, turn_deg}, {shift_mm, 0, 0}), 0.3, 0.2))))
+    return stop_of(call("guide.closed_loop", inputs(poses(displaced({0, 0, turn_deg}, {shift_mm, 0, 0}), 0.3, 0.2))))
         .reason;
   };
   EXPECT_TRUE(
@@ -247,10 +235,9 @@ TEST(ClosedLoop, StopsForAReason) {
   RobotReport report;
   state.stops = 3;
   report.stopped = "the force would pass 400 N";
-  EXPECT_TRUE(
-      stop_of(shipped::call("guide.closed_loop", inputs(poses(displaced({5, 0, 0}, {5, 0, -5})), state, report)))
-          .reason.starts_with("the robot stopped 4 times in a row: the force would pass 400 N; "));
-  EXPECT_TRUE(stop_of(shipped::call("guide.closed_loop", inputs(poses(displaced({5, 0, 0}, {5, 0, -5}), 3, 0.1))))
+  EXPECT_TRUE(stop_of(call("guide.closed_loop", inputs(poses(displaced({5, 0, 0}, {5, 0, -5})), state, report)))
+                  .reason.starts_with("the robot stopped 4 times in a row: the force would pass 400 N; "));
+  EXPECT_TRUE(stop_of(call("guide.closed_loop", inputs(poses(displaced({5, 0, 0}, {5, 0, -5}), 3, 0.1))))
                   .reason.starts_with("the poses are not trusted: they are known to 4.24 degrees and "));
   List<Pose> unknown = poses(displaced({5, 0, 0}, {5, 0, -5}));
   List<Pose> without;
@@ -259,26 +246,26 @@ TEST(ClosedLoop, StopsForAReason) {
     if (unknown.name(i) == "distal") pose.covariance.reset();
     without.add(unknown.name(i), pose);
   }
-  EXPECT_EQ(stop_of(shipped::call("guide.closed_loop", inputs(without))).reason,
+  EXPECT_EQ(stop_of(call("guide.closed_loop", inputs(without))).reason,
             "the pose of 'distal' is not trusted: the images do not determine it");
   Verdict verdict;
   verdict.judgement = Judgement::wrong;
   verdict.reasons = {"it lies on no edge"};
   List<Verdict> verdicts;
   verdicts.add("distal", verdict);
-  shipped::Inputs judged = inputs(unknown);
+  Inputs judged = inputs(unknown);
   judged["verdicts"] = shipped::list(verdicts, "fragment");
-  EXPECT_EQ(stop_of(shipped::call("guide.closed_loop", judged)).reason,
+  EXPECT_EQ(stop_of(call("guide.closed_loop", judged)).reason,
             "the pose of 'distal' is not trusted: it lies on no edge");
 }
 
 TEST(ClosedLoop, SaysWhatIsMissing) {
-  shipped::Inputs lacking = inputs(poses(displaced({1, 0, 0}, {0, 0, -5})));
+  Inputs lacking = inputs(poses(displaced({1, 0, 0}, {0, 0, -5})));
   List<Mesh> one;
   one.add("proximal", block(0, kLong_mm));
   lacking["models"] = shipped::list(one, "fragment");
   EXPECT_EQ(
-      shipped::refusal("guide.closed_loop", lacking),
+      refusal("guide.closed_loop", lacking),
       "there is no surface of a fragment 'distal', only of proximal; name both fragments with moved and reference");
   List<Mesh> apart = one;
   apart.add("distal", block(-80, -40));
@@ -287,15 +274,15 @@ TEST(ClosedLoop, SaysWhatIsMissing) {
   fields.add("proximal", field(0, kLong_mm));
   fields.add("distal", field(-80, -40));
   lacking["fields"] = shipped::list(fields, "fragment");
-  EXPECT_EQ(shipped::refusal("guide.closed_loop", lacking),
+  EXPECT_EQ(refusal("guide.closed_loop", lacking),
             "the two fragments are nowhere within 3 mm of each other in the CT; are they sides of one fracture?");
 }
 
 TEST(GuideWay, HasAPoseForEachPair) {
   List<Pose> pairs;
   for (int i = 0; i < 3; ++i) pairs.add(std::to_string(i + 1), poses(displaced({double(i), 0, 0}, {0, 0, 0}))[1]);
-  const Value way = shipped::call("guide.way", {{"poses", shipped::list(pairs, "pass")}}).at("trajectory");
+  const Value way = call("guide.way", {{"poses", shipped::list(pairs, "pass")}}).at("trajectory");
   EXPECT_FALSE(way.is_absent());
 }
 
-}  // namespace closed_loop_test
+}  // namespace marrow::test::closed_loop_test

@@ -1,14 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // The target on a robot's hand, and the one move that follows from it.
-#include <gtest/gtest.h>
-
 #include "marrow/domain/random.hpp"
 #include "marrow/toolbox/phantom/board_views.hpp"
-#include "shipped.hpp"
+#include "tests/harness/node_test.hpp"
 
-namespace open_loop_test {
-
-using namespace marrow;
+namespace marrow::test::open_loop_test {
 
 const std::string kBoard = std::string(MARROW_SOURCE_DIR) + "/pipelines/calibration/board.yaml";
 
@@ -31,18 +27,17 @@ View view_of(const RigidTransform& camera_from_target) {
 TEST(GuideTarget, IsFoundToAHundredthOfADegree) {
   const RigidTransform exact{"camera", "world", rotation_from_vector({0.1, -0.05, 0.4}), {5, -4, 560}};
   const View view = view_of(exact);
-  const Pose found =
-      shipped::call("guide.target", {{"view", shipped::item(view)}}, {{"board", kBoard}}).at("pose").as<Pose>();
+  const Pose found = output<Pose>("guide.target", "pose", {{"view", item(view)}}, {{"board", kBoard}});
   const RigidTransform camera_from_target = view.camera.camera_from_world * found.world_from_model;
-  EXPECT_LT(degrees(geodesic_angle_rad(camera_from_target.rotation, exact.rotation)), 0.02);
-  EXPECT_LT((camera_from_target.translation_mm - exact.translation_mm).norm(), 0.2);
+  EXPECT_LT(turn_between_deg(camera_from_target, exact), 0.02);
+  EXPECT_LT(shift_between_mm(camera_from_target, exact), 0.2);
   EXPECT_EQ(found.world_from_model.source, "target");
   EXPECT_LT(found.cost, 0.1);
 }
 
 TEST(GuideTarget, SaysThatItIsNotSeen) {
-  View view = view_of({"camera", "world", Eigen::Matrix3d::Identity(), {2000, 0, 600}});
-  const std::string text = shipped::refusal("guide.target", {{"view", shipped::item(view)}}, {{"board", kBoard}});
+  View view = view_of({"camera", "world", Matrix3d::Identity(), {2000, 0, 600}});
+  const std::string text = refusal("guide.target", {{"view", item(view)}}, {{"board", kBoard}});
   EXPECT_TRUE(text.starts_with("the target is not seen in view 'frontal': it shows ")) << text;
   EXPECT_TRUE(text.ends_with(" round dark discs, at least 6 are needed; bring the robot's hand into the beam")) << text;
 }
@@ -50,7 +45,7 @@ TEST(GuideTarget, SaysThatItIsNotSeen) {
 TEST(GuideTarget, SaysThatTheCameraIsAnotherOne) {
   View view = view_of({"camera", "world", rotation_from_vector({0.1, -0.05, 0.4}), {5, -4, 560}});
   view.camera.intrinsics(0, 0) *= 1.3;
-  const std::string text = shipped::refusal("guide.target", {{"view", shipped::item(view)}}, {{"board", kBoard}});
+  const std::string text = refusal("guide.target", {{"view", item(view)}}, {{"board", kBoard}});
   EXPECT_TRUE(text.starts_with("the target does not fit view 'frontal': its beads are ")) << text;
   EXPECT_TRUE(text.ends_with("at most 1.00 px are allowed; is it this target, and the camera of this image?")) << text;
 }
@@ -81,7 +76,7 @@ Scene scene() {
   return scene;
 }
 
-shipped::Inputs inputs(const Scene& scene) {
+Inputs inputs(const Scene& scene) {
   return {{"poses", shipped::list(scene.poses, "fragment")},
           {"hands", shipped::list(scene.hands, "station")},
           {"targets", shipped::list(scene.targets, "station")}};
@@ -90,12 +85,12 @@ shipped::Inputs inputs(const Scene& scene) {
 TEST(OpenLoop, OneMoveBringsTheFragmentToItsPlace) {
   for (const std::string method : {"ax_zb", "ax_xb"}) {
     const Scene made = scene();
-    const Pose motion = shipped::call("guide.open_loop", inputs(made), {{"method", method}}).at("motion").as<Pose>();
+    const Pose motion = output<Pose>("guide.open_loop", "motion", inputs(made), {{"method", method}});
     const RigidTransform after =
         inverse(kBase) * motion.world_from_model * kBase * made.poses.find("distal")->world_from_model;
     const RigidTransform& place = made.poses.find("proximal")->world_from_model;
-    EXPECT_LT(degrees(geodesic_angle_rad(after.rotation, place.rotation)), 1e-4) << method;
-    EXPECT_LT((after.translation_mm - place.translation_mm).norm(), 1e-3) << method;
+    EXPECT_LT(turn_between_deg(after, place), 1e-4) << method;
+    EXPECT_LT(shift_between_mm(after, place), 1e-3) << method;
   }
 }
 
@@ -104,7 +99,7 @@ Scene with_noise(Scene scene, double noise_deg, double noise_mm) {
   Random random(4);
   const auto drawn = [&](double deviation) {
     const double x = random.normal(), y = random.normal(), z = random.normal();
-    return Eigen::Vector3d(deviation * Eigen::Vector3d(x, y, z));
+    return Vector3d(deviation * Vector3d(x, y, z));
   };
   List<Pose> targets;
   for (std::size_t i = 0; i < scene.targets.size(); ++i) {
@@ -121,14 +116,14 @@ Scene with_noise(Scene scene, double noise_deg, double noise_mm) {
 TEST(OpenLoop, SaysHowFarFromItsPlaceTheMoveLeavesTheFragment) {
   for (const std::string method : {"ax_zb", "ax_xb"}) {
     const Scene made = with_noise(scene(), 0.02, 0.05);
-    const auto outputs = shipped::call("guide.open_loop", inputs(made), {{"method", method}});
+    const auto outputs = call("guide.open_loop", inputs(made), {{"method", method}});
     const RigidTransform after = inverse(kBase) * outputs.at("motion").as<Pose>().world_from_model * kBase *
                                  made.poses.find("distal")->world_from_model;
     const RigidTransform& place = made.poses.find("proximal")->world_from_model;
-    const double left_deg = shipped::figure(outputs.at("metrics"), "left_deg"),
-                 left_mm = shipped::figure(outputs.at("metrics"), "left_mm");
-    EXPECT_LT(degrees(geodesic_angle_rad(after.rotation, place.rotation)), 4 * left_deg) << method;
-    EXPECT_LT((after.translation_mm - place.translation_mm).norm(), 4 * left_mm) << method;
+    const double left_deg = figure(outputs.at("metrics"), "left_deg"),
+                 left_mm = figure(outputs.at("metrics"), "left_mm");
+    EXPECT_LT(turn_between_deg(after, place), 4 * left_deg) << method;
+    EXPECT_LT(shift_between_mm(after, place), 4 * left_mm) << method;
     EXPECT_LT(left_mm, 0.5) << method;
   }
 }
@@ -136,7 +131,7 @@ TEST(OpenLoop, SaysHowFarFromItsPlaceTheMoveLeavesTheFragment) {
 TEST(OpenLoop, AMoveByARobotWhosePlaceIsHardlyKnownIsRefused) {
   for (const std::string method : {"ax_zb", "ax_xb"}) {
     const Scene made = with_noise(scene(), 0.5, 1);
-    const std::string text = shipped::refusal("guide.open_loop", inputs(made), {{"method", method}});
+    const std::string text = refusal("guide.open_loop", inputs(made), {{"method", method}});
     EXPECT_TRUE(text.starts_with(
         "the stations do not tell well enough where the robot is: this move would leave the fragment "))
         << method << ": " << text;
@@ -145,8 +140,8 @@ TEST(OpenLoop, AMoveByARobotWhosePlaceIsHardlyKnownIsRefused) {
                        "robot further between stations, about axes that are at least 30 degrees apart, or raise "
                        "max_deviation_deg and max_deviation_mm"))
         << method << ": " << text;
-    EXPECT_EQ(shipped::refusal("guide.open_loop", inputs(made),
-                               {{"method", method}, {"max_deviation_deg", 90.0}, {"max_deviation_mm", 1000.0}}),
+    EXPECT_EQ(refusal("guide.open_loop", inputs(made),
+                      {{"method", method}, {"max_deviation_deg", 90.0}, {"max_deviation_mm", 1000.0}}),
               "")
         << method;
   }
@@ -162,7 +157,7 @@ TEST(OpenLoop, SaysThatThePosesDoNotShowTheFragmentsMiddle) {
   }
   made.poses = without;
   EXPECT_EQ(
-      shipped::refusal("guide.open_loop", inputs(made)),
+      refusal("guide.open_loop", inputs(made)),
       "the pose of 'distal' does not say where the fragment's middle is and how its long axis runs, as a matrix alone "
       "does not; wire the surfaces of both fragments to 'models', or give the node that reads the pose its model");
 }
@@ -172,8 +167,8 @@ TEST(OpenLoop, NeedsHandAndTargetOfTheSameStations) {
   List<Pose> fewer;
   fewer.add("station1", made.targets[0]);
   made.targets = fewer;
-  EXPECT_EQ(shipped::refusal("guide.open_loop", inputs(made)),
+  EXPECT_EQ(refusal("guide.open_loop", inputs(made)),
             "poses of the hand and of the target are not of the same stations: there are 4 and 1");
 }
 
-}  // namespace open_loop_test
+}  // namespace marrow::test::open_loop_test

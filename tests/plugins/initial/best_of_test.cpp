@@ -1,43 +1,35 @@
 // SPDX-License-Identifier: Apache-2.0
 // A cost is the mean square of six numbers: the distances (degrees and mm) of a pose from the bottom of a bowl.
-#include <gtest/gtest.h>
-
-#include "shipped.hpp"
 #include "tests/plugins/project/shapes.hpp"
 #include "tests/plugins/register/bowl.hpp"
 
-namespace best_of_test {
-
-using marrow::Cost;
-using marrow::Pose;
+namespace marrow::test::best_of_test {
 
 struct Trial {
   Trial() {
-    const marrow::Mesh mesh = shapes::cylinder(14, 120);
-    bottom.frame = marrow::fragment_frame(mesh);
-    bottom.world_from_model = {"world", mesh.frame};
+    const Mesh mesh = shapes::cylinder(14, 120);
+    bottom.frame = fragment_frame(mesh);
     cost = std::make_shared<const well::Well>(bottom.world_from_model, bottom.frame);
-    inputs["cost"] = marrow::Value::of<Cost>(cost);
+    inputs["cost"] = Value::of<Cost>(cost);
     use(std::make_shared<const well::Listener>());
   }
-  void use(std::shared_ptr<const marrow::Optimizer> optimizer) {
-    inputs["optimizer"] = marrow::Value::of<marrow::Optimizer>(std::move(optimizer));
+  void use(std::shared_ptr<const Optimizer> optimizer) {
+    inputs["optimizer"] = Value::of<Optimizer>(std::move(optimizer));
   }
   /// A start at this distance along the bone. Its cost is the sixth part of its square.
   Pose away(double mm) const { return well::pose_at(bottom, 0, 0, 0, 0, 0, mm); }
-  void give(const std::string& input, double mm) { inputs[input] = shipped::item(away(mm)); }
-  Pose run(const shipped::Options& options = {}) {
-    marrow::Context::Hooks hooks;
-    hooks.log = [this](std::string_view text, marrow::LogLevel level) {
-      EXPECT_EQ(level, marrow::LogLevel::info);
-      log.emplace_back(text);
-    };
-    return shipped::call("initial.best_of", inputs, options, marrow::Context(hooks)).at("pose").as<Pose>();
+  void give(const std::string& input, double mm) { inputs[input] = item(away(mm)); }
+  Pose run(const Options& options = {}) {
+    Heard heard;
+    const Pose pose = output<Pose>("initial.best_of", "pose", inputs, options, heard.context);
+    EXPECT_EQ(heard.warnings, Strings{});
+    log.insert(log.end(), heard.lines.begin(), heard.lines.end());
+    return pose;
   }
   Pose bottom;
   std::shared_ptr<const well::Well> cost;
-  shipped::Inputs inputs;
-  std::vector<std::string> log;
+  Inputs inputs;
+  Strings log;
 };
 
 TEST(BestOf, TakesTheStartOfLeastCostAndSaysWhatEachCosts) {
@@ -47,19 +39,18 @@ TEST(BestOf, TakesTheStartOfLeastCostAndSaysWhatEachCosts) {
   trial.give("fourth", -12);
   const Pose best = trial.run();
   EXPECT_NEAR(best.cost, 9.0 / 6, 1e-9);
-  EXPECT_NEAR((best.world_from_model.translation_mm - trial.away(3).world_from_model.translation_mm).norm(), 0, 1e-9);
+  EXPECT_NEAR(shift_between_mm(best.world_from_model, trial.away(3).world_from_model), 0, 1e-9);
   EXPECT_EQ(best.evaluations, 3 * 7) << "of all starts";
-  ASSERT_EQ(trial.log.size(), 1u);
-  EXPECT_EQ(trial.log[0], "second is the best start, with a cost of 1.5; first 6, fourth 24");
+  EXPECT_EQ(trial.log, Strings{"second is the best start, with a cost of 1.5; first 6, fourth 24"});
 }
 
 TEST(BestOf, RefinesEachStart) {
   Trial trial;
-  trial.inputs["optimizer"] = shipped::call("optimizer.nelder_mead", {}).at("optimizer");
+  trial.inputs["optimizer"] = call("optimizer.nelder_mead", {}).at("optimizer");
   trial.give("third", 20);
   const Pose refined = trial.run();
   EXPECT_LT(refined.cost, 1);
-  EXPECT_LT(well::way(trial.bottom.world_from_model, refined.world_from_model, refined.frame).norm(), 2.5);
+  EXPECT_LT(well::apart(trial.bottom, refined), 2.5);
 }
 
 TEST(BestOf, OfEqualStartsTheFirstIsTaken) {
@@ -67,9 +58,9 @@ TEST(BestOf, OfEqualStartsTheFirstIsTaken) {
   Pose one = trial.away(5), same = trial.away(5);
   one.warnings = {"one"};
   same.warnings = {"same"};
-  trial.inputs["third"] = shipped::item(one);
-  trial.inputs["fourth"] = shipped::item(same);
-  EXPECT_EQ(trial.run().warnings, std::vector<std::string>{"one"});
+  trial.inputs["third"] = item(one);
+  trial.inputs["fourth"] = item(same);
+  EXPECT_EQ(trial.run().warnings, Strings{"one"});
 }
 
 TEST(BestOf, SearchesAtOneCoarseLevelWithFewEvaluations) {
@@ -92,29 +83,26 @@ TEST(BestOf, SearchesAtOneCoarseLevelWithFewEvaluations) {
   EXPECT_EQ(steps.sum(), 5 * 4 + 8);
 }
 
-TEST(BestOf, SaysThatNoWayLedToAStart) {
-  EXPECT_EQ(shipped::refusal("initial.best_of", Trial().inputs),
+TEST(BestOf, SaysWhatIsWrong) {
+  Trial trial;
+  EXPECT_EQ(refusal("initial.best_of", trial.inputs),
             "no way led to a start: none of the inputs first, second, third and fourth is there; see why the nodes "
             "that they are wired to gave none");
-}
-
-TEST(BestOf, NamesTheStartThatIsNoRigidPose) {
-  Trial trial;
   trial.give("first", 1);
   Pose bent = trial.away(1);
   bent.world_from_model.rotation *= 2;
-  trial.inputs["second"] = shipped::item(bent);
-  EXPECT_NE(shipped::refusal("initial.best_of", trial.inputs).find("second"), std::string::npos);
+  trial.inputs["second"] = item(bent);
+  EXPECT_NE(refusal("initial.best_of", trial.inputs).find("second"), std::string::npos);
 }
 
 /// Says nothing beyond 10 mm.
 class Shortsighted : public well::Well {
  public:
   using Well::Well;
-  std::string nothing_compared(const marrow::RigidTransform& pose) const override {
+  std::string nothing_compared(const RigidTransform& pose) const override {
     return pose.translation_mm.norm() > 10 ? "view 'a': it shows nothing of the bone" : "";
   }
-  std::shared_ptr<const Cost> at_level(const marrow::CostLevel&) const override {
+  std::shared_ptr<const Cost> at_level(const CostLevel&) const override {
     return std::make_shared<Shortsighted>(*this);
   }
 };
@@ -122,10 +110,10 @@ class Shortsighted : public well::Well {
 TEST(BestOf, AStartAboutWhichTheImagesSayNothingIsNone) {
   Trial trial;
   trial.inputs["cost"] =
-      marrow::Value::of<Cost>(std::make_shared<const Shortsighted>(trial.bottom.world_from_model, trial.bottom.frame));
+      Value::of<Cost>(std::make_shared<const Shortsighted>(trial.bottom.world_from_model, trial.bottom.frame));
   trial.give("first", 20);
   trial.give("third", 30);
-  EXPECT_EQ(shipped::refusal("initial.best_of", trial.inputs),
+  EXPECT_EQ(refusal("initial.best_of", trial.inputs),
             "the images say nothing about any start: first: view 'a': it shows nothing of the bone; third: view 'a': "
             "it shows nothing of the bone; give a start nearer to the bone, or see whether the masks, the edges and "
             "the model are right");
@@ -141,11 +129,11 @@ TEST(BestOf, TheModelGivesTheAxesOfAStartThatHasNone) {
   Trial trial;
   Pose start = trial.away(5);
   start.frame = {};
-  trial.inputs["second"] = shipped::item(start);
-  trial.inputs["model"] = shipped::item(shapes::cylinder(14, 120));
+  trial.inputs["second"] = item(start);
+  trial.inputs["model"] = item(shapes::cylinder(14, 120));
   const Pose best = trial.run();
   EXPECT_TRUE(best.frame.is_anatomical);
   EXPECT_LT((best.frame.origin_mm - trial.bottom.frame.origin_mm).norm(), 1e-9);
 }
 
-}  // namespace best_of_test
+}  // namespace marrow::test::best_of_test

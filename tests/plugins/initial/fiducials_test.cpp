@@ -1,29 +1,22 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <gtest/gtest.h>
-
 #include <Eigen/Eigenvalues>
-#include <random>
 
 #include "tests/plugins/initial/landmark_scene.hpp"
 
-namespace fiducials_test {
+namespace marrow::test::fiducials_test {
 
-using Eigen::Vector3d;
 using scene::exact_pose, scene::model, scene::seen_in;
 
-marrow::Pose found(const marrow::Landmarks& landmarks, const shipped::Options& options = {}) {
-  return shipped::call("initial.fiducials", {{"model", model()}, {"landmarks", shipped::item(landmarks)}}, options)
-      .at("pose")
-      .as<marrow::Pose>();
+Inputs inputs(const Landmarks& landmarks) { return {{"model", model()}, {"landmarks", item(landmarks)}}; }
+Pose found(const Landmarks& landmarks, const Options& options = {}) {
+  return output<Pose>("initial.fiducials", "pose", inputs(landmarks), options);
 }
-std::string refusal(const marrow::Landmarks& landmarks) {
-  return shipped::refusal("initial.fiducials", {{"model", model()}, {"landmarks", shipped::item(landmarks)}});
-}
+std::string refusal(const Landmarks& landmarks) { return shipped::refusal("initial.fiducials", inputs(landmarks)); }
 
 TEST(Fiducials, ExactPointsGiveTheExactPose) {
   const auto points = scene::spread();
   for (const std::size_t count : {3u, 4u, 6u}) {
-    const marrow::Pose pose = found(seen_in({points.begin(), points.begin() + std::ptrdiff_t(count)}, {}));
+    const Pose pose = found(seen_in({points.begin(), points.begin() + std::ptrdiff_t(count)}, {}));
     EXPECT_LT((pose.world_from_model.rotation - exact_pose().rotation).norm(), 1e-12) << count;
     EXPECT_LT((pose.world_from_model.translation_mm - exact_pose().translation_mm).norm(), 1e-10) << count;
     EXPECT_LT(pose.cost, 1e-10);
@@ -41,9 +34,9 @@ TEST(Fiducials, ErrorsAreThoseOfFitzpatricksFormula) {
   const Vector3d target(5, -30, 140);
   Vector3d centre = Vector3d::Zero();
   for (const Vector3d& point : points) centre += point / n;
-  Eigen::Matrix3d scatter = Eigen::Matrix3d::Zero();
+  Matrix3d scatter = Matrix3d::Zero();
   for (const Vector3d& point : points) scatter += (point - centre) * (point - centre).transpose() / n;
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> principal(scatter);
+  const Eigen::SelfAdjointEigenSolver<Matrix3d> principal(scatter);
   double sum = 0;
   for (int k = 0; k < 3; ++k) {
     const double along = principal.eigenvectors().col(k).dot(target - centre);
@@ -55,9 +48,9 @@ TEST(Fiducials, ErrorsAreThoseOfFitzpatricksFormula) {
   constexpr int kRuns = 2000;
   double fre = 0, tre = 0, predicted = 0;
   for (int run = 0; run < kRuns; ++run) {
-    marrow::Landmarks landmarks = seen_in(points, {});
+    Landmarks landmarks = seen_in(points, {});
     for (auto& tracked : landmarks.tracked) tracked.world_mm += Vector3d(noise(random), noise(random), noise(random));
-    const marrow::Pose pose = found(landmarks, {{"noise_mm", 0.4}});
+    const Pose pose = found(landmarks, {{"noise_mm", 0.4}});
     fre += pose.cost * pose.cost / kRuns;
     tre += (pose.world_from_model * target - exact_pose() * target).squaredNorm() / kRuns;
     Eigen::Matrix<double, 3, 6> by_motion;  // of the target by (r, t)
@@ -65,8 +58,6 @@ TEST(Fiducials, ErrorsAreThoseOfFitzpatricksFormula) {
     by_motion.rightCols<3>() = pose.frame.axes;
     predicted += (by_motion * *pose.covariance * by_motion.transpose()).trace() / kRuns;
   }
-  std::printf("FRE %.3f mm (%.3f expected), TRE %.3f mm (%.3f by the formula)\n", std::sqrt(fre),
-              std::sqrt(0.48 * (1 - 2 / n)), std::sqrt(tre), std::sqrt(formula));
   EXPECT_NEAR(predicted, formula, 1e-9) << "the covariance says the same at any target";
   EXPECT_NEAR(fre, 0.48 * (1 - 2 / n), 0.02);
   EXPECT_NEAR(tre, formula, 0.06 * formula);
@@ -78,7 +69,7 @@ TEST(Fiducials, WithoutAGivenNoiseTheResidualsSayIt) {
   double variance = 0;
   constexpr int kRuns = 500;
   for (int run = 0; run < kRuns; ++run) {
-    marrow::Landmarks landmarks = seen_in(scene::spread(), {});
+    Landmarks landmarks = seen_in(scene::spread(), {});
     for (auto& tracked : landmarks.tracked) tracked.world_mm += Vector3d(noise(random), noise(random), noise(random));
     variance +=
         (*found(landmarks).covariance)(3, 3) / (*found(landmarks, {{"noise_mm", 1.0}}).covariance)(3, 3) / kRuns;
@@ -88,19 +79,19 @@ TEST(Fiducials, WithoutAGivenNoiseTheResidualsSayIt) {
 
 TEST(Fiducials, NoiseOfPointsInAPlaneMakesNoReflection) {
   // Three points, and flat noise across their plane: a reflection would fit as well as the rotation.
-  marrow::Landmarks landmarks = seen_in({{20, 0, 0}, {-10, 17, 0}, {-10, -17, 0}, {0, 0, 0}}, {});
+  Landmarks landmarks = seen_in({{20, 0, 0}, {-10, 17, 0}, {-10, -17, 0}, {0, 0, 0}}, {});
   for (std::size_t i = 0; i < 4; ++i)
     landmarks.tracked[i].world_mm += exact_pose().rotation * Vector3d(0, 0, i == 3 ? 1.5 : -0.5);
-  const marrow::Pose pose = found(landmarks);
+  const Pose pose = found(landmarks);
   EXPECT_NEAR(pose.world_from_model.rotation.determinant(), 1, 1e-9);
-  EXPECT_LT(marrow::geodesic_angle_rad(pose.world_from_model.rotation, exact_pose().rotation), 1e-6);
+  EXPECT_LT(geodesic_angle_rad(pose.world_from_model.rotation, exact_pose().rotation), 1e-6);
   EXPECT_NEAR(pose.cost, std::sqrt((3 * 0.25 + 2.25) / 4), 1e-6);
 }
 
 TEST(Fiducials, WarnsOfExchangedNames) {
-  marrow::Landmarks landmarks = seen_in(scene::spread(), {});
+  Landmarks landmarks = seen_in(scene::spread(), {});
   std::swap(landmarks.tracked[0].world_mm, landmarks.tracked[1].world_mm);
-  const marrow::Pose pose = found(landmarks);
+  const Pose pose = found(landmarks);
   ASSERT_EQ(pose.warnings.size(), 1u);
   EXPECT_EQ(pose.warnings[0].find("the tracked points do not fit those in the CT: they are off by "), 0u)
       << pose.warnings[0];
@@ -113,7 +104,7 @@ TEST(Fiducials, SaysWhatIsWrong) {
   EXPECT_EQ(
       refusal(seen_in({{0, 0, 0}, {0, 0.1, 30}, {0, 0, 60}}, {})),
       "the tracked points in the CT lie on one line, so the rotation about it is not determined; add one aside of it");
-  marrow::Landmarks landmarks = seen_in(points, {});
+  Landmarks landmarks = seen_in(points, {});
   landmarks.tracked[1].name = "patella";
   EXPECT_EQ(refusal(landmarks),
             "'patella' was tracked, but the landmarks have no point of that name in the CT; give its place there, or "
@@ -123,9 +114,8 @@ TEST(Fiducials, SaysWhatIsWrong) {
   EXPECT_EQ(refusal(landmarks).find("the tracked points are the mirror image of those in the CT: a reflection leaves "),
             0u)
       << refusal(landmarks);
-  EXPECT_EQ(shipped::refusal("initial.fiducials",
-                             {{"model", shipped::item(marrow::Mesh())}, {"landmarks", shipped::item(landmarks)}}),
+  EXPECT_EQ(shipped::refusal("initial.fiducials", with(inputs(landmarks), {{"model", item(Mesh())}})),
             "model: the surface has no triangles");
 }
 
-}  // namespace fiducials_test
+}  // namespace marrow::test::fiducials_test

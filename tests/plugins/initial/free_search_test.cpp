@@ -1,30 +1,23 @@
 // SPDX-License-Identifier: Apache-2.0
 // A search without a start: a body of three ellipsoids, whose outline is exact, in any orientation anywhere in view.
-#include <gtest/gtest.h>
-#include <oneapi/tbb/global_control.h>
-
 #include "marrow/initial/evidence.hpp"
 #include "marrow/initial/seen_space.hpp"
 #include "marrow/toolbox/analytic/body.hpp"
-#include "shipped.hpp"
+#include "tests/harness/threads.hpp"
 
-namespace free_search_test {
+namespace marrow::test::free_search_test {
 
-using namespace marrow;
 using analytic::Body, analytic::BodyProjector;
 
 constexpr int kSize_px = 256;
 
 Body body() { return {{{0, 0, 0}, {16, 12, 30}}, {{26, 4, 18}, {7, 8, 11}}, {{-20, -16, -14}, {9, 6, 7}}}; }
 
-List<View> views_of(const std::vector<double>& angles_deg) {
+List<View> views_of(const Numbers& angles_deg) {
   List<View> views;
   for (const double angle_deg : angles_deg) {
     const std::string name = "at " + std::to_string(int(angle_deg));
-    views.add(name, View{name,
-                         {cv::Mat(kSize_px, kSize_px, CV_16U, cv::Scalar(1000))},
-                         analytic::c_arm(angle_deg, kSize_px, kSize_px, 1.2),
-                         {}});
+    views.add(name, even_view(name, analytic::c_arm(angle_deg, kSize_px, kSize_px, 1.2)));
   }
   return views;
 }
@@ -41,82 +34,73 @@ EdgeMap edges_of(const Camera& camera, const RigidTransform& world_from_ct) {
 }
 
 struct Trial {
-  explicit Trial(const RigidTransform& moved, const std::vector<double>& angles_deg = {0, 80}) : truth(moved) {
+  explicit Trial(const RigidTransform& moved, const Numbers& angles_deg = {0, 80}) : truth(moved) {
     views = views_of(angles_deg);
     for (std::size_t i = 0; i < views.size(); ++i) edges.add(views.name(i), edges_of(views[i].camera, truth));
-    inputs = {{"model", shipped::item(analytic::mesh_of(body()))},
-              {"views", shipped::list(views, "view")},
+    inputs = {{"model", item(analytic::mesh_of(body()))},
+              {"views", each_view(views)},
               {"edges", shipped::list(edges, "view")},
               {"projector", Value::of<OutlineProjector>(std::make_shared<const BodyProjector>(body()))}};
-    const shipped::Inputs compared{
-        {"views", inputs["views"]}, {"edges", inputs["edges"]}, {"projector", inputs["projector"]}};
-    inputs["cost"] = shipped::call("similarity.contour_distance", compared, {{"estimate_offset", false}}).at("cost");
-    inputs["optimizer"] = shipped::call("optimizer.levenberg_marquardt", {}).at("optimizer");
+    const Inputs compared{{"views", inputs["views"]}, {"edges", inputs["edges"]}, {"projector", inputs["projector"]}};
+    inputs["cost"] = Value::of<Cost>(
+        cost_by("similarity.contour_distance",
+                {{"views", inputs["views"]}, {"edges", inputs["edges"]}, {"projector", inputs["projector"]}},
+                {{"estimate_offset", false}}));
+    inputs["optimizer"] = call("optimizer.levenberg_marquardt", {}).at("optimizer");
   }
   RigidTransform run() const {
-    const shipped::Options few{{"poses", std::int64_t(1500)}, {"candidates", std::int64_t(20)}};
-    return shipped::call("initial.global_search", inputs, few).at("pose").as<Pose>().world_from_model;
+    const Options few{{"poses", std::int64_t(1500)}, {"candidates", std::int64_t(20)}};
+    return output<Pose>("initial.global_search", "pose", inputs, few).world_from_model;
   }
-  std::string refusal() const { return shipped::refusal("initial.global_search", inputs); }
 
   RigidTransform truth;
   List<View> views;
   List<EdgeMap> edges;
-  shipped::Inputs inputs;
+  Inputs inputs;
 };
 
-double apart_deg(const RigidTransform& a, const RigidTransform& b) {
-  return degrees(geodesic_angle_rad(a.rotation, b.rotation));
+TEST(FreeSearch, FindsAnyOrientationAnywhereInView) {
+  for (const Vector3d& turn :
+       {Vector3d(0, 0, 0), Vector3d(3.1, 0, 0), Vector3d(0.4, -1.9, 0.8), Vector3d(-1.2, 1.3, -2)}) {
+    const Trial trial(placed({18, -25, 22}, turn));
+    const RigidTransform found = trial.run();
+    EXPECT_LT(turn_between_deg(found, trial.truth), 1) << turn.transpose();
+    EXPECT_LT(shift_between_mm(found, trial.truth), 0.5) << turn.transpose();
+  }
 }
-
-class AnyOrientation : public testing::TestWithParam<Eigen::Vector3d> {};
-
-TEST_P(AnyOrientation, IsFoundAnywhereInView) {
-  const Trial trial(analytic::moved_by(GetParam(), {18, -25, 22}));
-  const RigidTransform found = trial.run();
-  EXPECT_LT(apart_deg(found, trial.truth), 1);
-  EXPECT_LT((found.translation_mm - trial.truth.translation_mm).norm(), 0.5);
-}
-
-INSTANTIATE_TEST_SUITE_P(Turns, AnyOrientation,
-                         testing::Values(Eigen::Vector3d(0, 0, 0), Eigen::Vector3d(3.1, 0, 0),
-                                         Eigen::Vector3d(0.4, -1.9, 0.8), Eigen::Vector3d(-1.2, 1.3, -2)));
 
 TEST(FreeSearch, OneViewTellsAllButTheDepth) {
-  const Trial trial(analytic::moved_by({0.4, -1.9, 0.8}, {18, -25, 22}), {0});
+  const Trial trial(placed({18, -25, 22}, {0.4, -1.9, 0.8}), {0});
   const RigidTransform found = trial.run();
-  EXPECT_LT(apart_deg(found, trial.truth), 10);
+  EXPECT_LT(turn_between_deg(found, trial.truth), 10);
   const Camera& camera = trial.views[0].camera;
-  const Eigen::Vector2d at = project(camera, found.translation_mm), right = project(camera, trial.truth.translation_mm);
+  const Vector2d at = project(camera, found.translation_mm), right = project(camera, trial.truth.translation_mm);
   EXPECT_LT((at - right).norm(), 3);
 }
 
 TEST(FreeSearch, SameBytesAtAnyNumberOfThreads) {
-  const Trial trial(analytic::moved_by({0.4, -1.9, 0.8}, {18, -25, 22}));
-  const auto run = [&](std::size_t threads) {
-    tbb::global_control control(tbb::global_control::max_allowed_parallelism, threads);
-    return trial.run();
-  };
+  const Trial trial(placed({18, -25, 22}, {0.4, -1.9, 0.8}));
+  const auto run = [&](std::size_t threads) { return with_threads(threads, [&] { return trial.run(); }); };
   const RigidTransform a = run(1), b = run(4);
   EXPECT_EQ(a.rotation, b.rotation);
   EXPECT_EQ(a.translation_mm, b.translation_mm);
 }
 
 TEST(FreeSearch, TheTruthHasMoreEvidenceThanOtherPlacesAndMostlyHiddenOnes) {
-  const Trial trial(analytic::moved_by({0.4, -1.9, 0.8}, {}));
+  const Trial trial(placed({0, 0, 0}, {0.4, -1.9, 0.8}));
   const Mesh model = analytic::mesh_of(body());
   const BodyProjector projector(body());
   const initial::Seen seen{model, projector, trial.views, trial.edges};
-  const initial::Evidence evidence(seen, Eigen::Vector3d::Zero(), 2);
+  const initial::Evidence evidence(seen, Vector3d::Zero(), 2);
   const double most = evidence.of(trial.truth);
   EXPECT_GT(most, 0);
   RigidTransform beside = trial.truth, hidden = trial.truth;
-  beside.translation_mm += Eigen::Vector3d(12, 0, 0);
-  hidden.translation_mm += Eigen::Vector3d(0, 0, 500);
+  beside.translation_mm += Vector3d(12, 0, 0);
+  hidden.translation_mm += Vector3d(0, 0, 500);
   EXPECT_LT(evidence.of(beside), 0.5 * most);
   EXPECT_EQ(evidence.of(hidden), 0);
   std::vector<RigidTransform> moved{beside};
-  evidence.climb(moved, Eigen::Vector3d::Zero(), 4, 4);
+  evidence.climb(moved, Vector3d::Zero(), 4, 4);
   EXPECT_GT(evidence.of(moved[0]), evidence.of(beside));
 }
 
@@ -125,34 +109,27 @@ TEST(SeenSpace, IsWhereTheViewsCross) {
   const initial::SeenSpace space = initial::SeenSpace::of(views);
   EXPECT_LT(space.middle_mm.norm(), 15);  // the isocentre, 600 mm from both sources
   EXPECT_NEAR(space.width_mm, 256 * 1.2 * 0.6, 5);
-  for (const Eigen::Vector3d& place : initial::places_in(space, views, 20))
+  for (const Vector3d& place : initial::places_in(space, views, 20))
     for (const View& view : views) EXPECT_TRUE(initial::is_seen(view.camera, place));
 }
 
 TEST(FreeSearch, SaysWhatIsWrong) {
-  Trial trial(analytic::moved_by({0.4, -1.9, 0.8}, {}));
-  Trial unwired = trial;
-  unwired.inputs.erase("edges");
+  const std::string node = "initial.global_search";
+  const Trial trial(placed({0, 0, 0}, {0.4, -1.9, 0.8}));
+  Inputs unwired = trial.inputs;
+  unwired.erase("edges");
   EXPECT_EQ(
-      unwired.refusal(),
+      refusal(node, unwired),
       "a search without a start needs projector, views and edges, but nothing is wired to edges; wire it, or give "
       "a start");
-  Trial apart = trial;
-  List<View> views;
-  views.add("at 0", trial.views[0]);
   View moved = trial.views[1];
-  moved.camera.camera_from_world.translation_mm += Eigen::Vector3d(0, 3000, 0);
-  views.add("at 80", moved);
-  apart.inputs["views"] = shipped::list(views, "view");
-  EXPECT_EQ(apart.refusal(),
+  moved.camera.camera_from_world.translation_mm += Vector3d(0, 3000, 0);
+  EXPECT_EQ(refusal(node, with(trial.inputs, {{"views", each_view(trial.views[0], moved)}})),
             "no place between 250 and 2000 mm in front of the sources is seen by all views, so the bone cannot be "
             "either; see whether the cameras belong to these images and state their world in mm");
-  Trial empty = trial;
-  List<EdgeMap> none;
-  none.add("at 0", EdgeMap{kSize_px, kSize_px, {}});
-  none.add("at 80", EdgeMap{kSize_px, kSize_px, {}});
-  empty.inputs["edges"] = shipped::list(none, "view");
-  EXPECT_NE(empty.refusal().find("edge"), std::string::npos);
+  const EdgeMap none{kSize_px, kSize_px, {}};
+  EXPECT_NE(refusal(node, with(trial.inputs, {{"edges", per_view("at 0", none, "at 80", none)}})).find("edge"),
+            std::string::npos);
 }
 
-}  // namespace free_search_test
+}  // namespace marrow::test::free_search_test

@@ -1,31 +1,27 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-#include <Eigen/Geometry>
-#include <array>
-#include <cmath>
-#include <marrow/domain/camera.hpp>
-#include <marrow/domain/mesh.hpp>
+#include "tests/harness/node_test.hpp"
 
-namespace tube {
+namespace marrow::test::tube {
 
 /// A closed tube along z from -half to +half length. radius(z, angle) and centre(z) [mm] give its shape.
 template <class Radius, class Centre>
-marrow::Mesh mesh(double half_mm, Radius radius, Centre centre, int sides = 180, int rings = 120) {
-  marrow::Mesh mesh;
-  const auto add = [&](const Eigen::Vector3d& point) {
+Mesh mesh(double half_mm, Radius radius, Centre centre, int sides = 180, int rings = 120) {
+  Mesh mesh;
+  const auto add = [&](const Vector3d& point) {
     mesh.vertices_mm.push_back(point);
     return std::uint32_t(mesh.vertices_mm.size() - 1);
   };
   for (int ring = 0; ring <= rings; ++ring) {
     const double z = half_mm * (2.0 * ring / rings - 1);
     for (int side = 0; side < sides; ++side) {
-      const double angle = 2 * marrow::kPi * side / sides, r = radius(z, angle);
-      add(centre(z) + Eigen::Vector3d(r * std::cos(angle), r * std::sin(angle), z));
+      const double angle = 2 * kPi * side / sides, r = radius(z, angle);
+      add(centre(z) + Vector3d(r * std::cos(angle), r * std::sin(angle), z));
     }
   }
   const auto at = [&](int ring, int side) { return std::uint32_t(ring * sides + side % sides); };
-  const std::uint32_t bottom = add(centre(-half_mm) + Eigen::Vector3d(0, 0, -half_mm)),
-                      top = add(centre(half_mm) + Eigen::Vector3d(0, 0, half_mm));
+  const std::uint32_t bottom = add(centre(-half_mm) + Vector3d(0, 0, -half_mm)),
+                      top = add(centre(half_mm) + Vector3d(0, 0, half_mm));
   for (int side = 0; side < sides; ++side) {
     for (int ring = 0; ring < rings; ++ring) {
       mesh.triangles.push_back({at(ring, side), at(ring, side + 1), at(ring + 1, side + 1)});
@@ -37,42 +33,40 @@ marrow::Mesh mesh(double half_mm, Radius radius, Centre centre, int sides = 180,
   return mesh;
 }
 
-inline marrow::Mesh cylinder(double radius_mm, double half_mm) {
+inline Mesh cylinder(double radius_mm, double half_mm) {
   return mesh(
-      half_mm, [=](double, double) { return radius_mm; }, [](double) { return Eigen::Vector3d(0, 0, 0); });
+      half_mm, [=](double, double) { return radius_mm; }, [](double) { return Vector3d(0, 0, 0); });
 }
 
-inline marrow::RigidTransform posed(const Eigen::Vector3d& rotation_deg, const Eigen::Vector3d& translation_mm) {
-  return {"world", "ct", marrow::rotation_from_vector(rotation_deg * (marrow::kPi / 180)), translation_mm};
+inline RigidTransform posed(const Vector3d& rotation_deg, const Vector3d& translation_mm) {
+  return {"world", "ct", rotation_from_vector(rotation_deg * (kPi / 180)), translation_mm};
 }
 
 /// The two image lines in which planes through the source touch a circular cylinder, between the images of two of its
 /// points.
-inline std::array<Eigen::Vector3d, 2> tangents(const marrow::Camera& camera, const Eigen::Vector3d& point,
-                                               const Eigen::Vector3d& direction, double radius_mm) {
-  const Eigen::Vector3d source = marrow::source_position_mm(camera), d = direction.normalized();
-  Eigen::Vector3d to_axis = point - source;
+inline std::array<Vector3d, 2> tangents(const Camera& camera, const Vector3d& point, const Vector3d& direction,
+                                        double radius_mm) {
+  const Vector3d source = source_position_mm(camera), d = direction.normalized();
+  Vector3d to_axis = point - source;
   to_axis -= d * d.dot(to_axis);
   const double distance = to_axis.norm(), sine = radius_mm / distance, cosine = std::sqrt(1 - sine * sine);
-  const Eigen::Vector3d towards = to_axis / distance, across = d.cross(towards);
-  std::array<Eigen::Vector3d, 2> lines;
+  const Vector3d towards = to_axis / distance, across = d.cross(towards);
+  std::array<Vector3d, 2> lines;
   for (int side = 0; side < 2; ++side) {
-    const Eigen::Vector3d normal = (side ? -1.0 : 1.0) * cosine * across - sine * towards;  // of the tangent plane
+    const Vector3d normal = (side ? -1.0 : 1.0) * cosine * across - sine * towards;  // of the tangent plane
     lines[side] = camera.intrinsics.inverse().transpose() * (camera.camera_from_world.rotation * normal);
   }
   return lines;
 }
 
 /// Point of an image line at height v.
-inline Eigen::Vector2d at_height(const Eigen::Vector3d& line, double v) {
-  return {-(line.y() * v + line.z()) / line.x(), v};
-}
+inline Vector2d at_height(const Vector3d& line, double v) { return {-(line.y() * v + line.z()) / line.x(), v}; }
 
 /// Exact borders between two heights of the image, as shaft lines.
-inline marrow::ShaftLines borders(const marrow::Camera& camera, const Eigen::Vector3d& point,
-                                  const Eigen::Vector3d& direction, double radius_mm, double from_v, double to_v) {
+inline ShaftLines borders(const Camera& camera, const Vector3d& point, const Vector3d& direction, double radius_mm,
+                          double from_v, double to_v) {
   const auto lines = tangents(camera, point, direction, radius_mm);
-  marrow::ShaftLines shaft;
+  ShaftLines shaft;
   shaft.left = {at_height(lines[0], from_v), at_height(lines[0], to_v)};
   shaft.right = {at_height(lines[1], from_v), at_height(lines[1], to_v)};
   if (shaft.left.from_px.x() < shaft.right.from_px.x())
@@ -80,4 +74,4 @@ inline marrow::ShaftLines borders(const marrow::Camera& camera, const Eigen::Vec
   return shaft;
 }
 
-}  // namespace tube
+}  // namespace marrow::test::tube

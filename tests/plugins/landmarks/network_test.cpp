@@ -1,23 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <gtest/gtest.h>
-
-#include "shipped.hpp"
 #include "tests/plugins/edges/drawn.hpp"
 #include "tests/plugins/toolbox/network/onnx_model.hpp"
 #include "tests/plugins/toolbox/network/written.hpp"
 
-namespace network_test {
+namespace marrow::test::network_test {
 
-using namespace marrow;
-using marrow::test::Convolution, marrow::test::kPlain, marrow::test::with, marrow::test::Written;
-
-const Eigen::Vector2d kDark(83.3, 61.7), kBright(40.2, 90.6);
+const Vector2d kDark(83.3, 61.7), kBright(40.2, 90.6);
 
 /// A dark spot whose network value is 1, and a bright one of -0.75.
 View spots() {
   return edges::drawn(150, [](double u, double v) {
-    const auto spot = [&](const Eigen::Vector2d& at, double sigma) {
-      return std::exp(-0.5 * (Eigen::Vector2d(u, v) - at).squaredNorm() / (sigma * sigma));
+    const auto spot = [&](const Vector2d& at, double sigma) {
+      return std::exp(-0.5 * (Vector2d(u, v) - at).squaredNorm() / (sigma * sigma));
     };
     return 30000 - 20000 * spot(kDark, 4) + 15000 * spot(kBright, 3);
   });
@@ -32,26 +26,25 @@ Written network(const std::string& pixels = "pixel_px: 1") {
   return Written(Convolution{.side = 1, .weights = {1, -1}, .bias = {0, 0}}.bytes(), text);
 }
 
-shipped::Inputs inputs(const std::vector<std::string>& names) {
+Inputs inputs(const Strings& names) {
   Landmarks landmarks;
   for (const std::string& name : names) landmarks.points.push_back({name, {1, 2, 3}});
   List<View> views;
   views.add("frontal", spots());
-  return {{"points", shipped::item(landmarks)}, {"views", shipped::list(views, "view")}};
+  return {{"points", item(landmarks)}, {"views", shipped::list(views, "view")}};
 }
 
 struct Answer {
   Landmarks landmarks;
-  std::vector<std::string> said;
+  Strings said;
 };
 
-Answer found(const Written& written, const std::vector<std::string>& names, shipped::Options options = {}) {
+Answer found(const Written& written, const Strings& names, Options options = {}) {
   options["network"] = written.file().string();
   Answer answer;
   Context::Hooks hooks;
   hooks.log = [&](std::string_view text, LogLevel) { answer.said.emplace_back(text); };
-  answer.landmarks =
-      shipped::call("landmarks.network", inputs(names), options, Context(hooks)).at("landmarks").as<Landmarks>();
+  answer.landmarks = output<Landmarks>("landmarks.network", "landmarks", inputs(names), options, Context(hooks));
   return answer;
 }
 
@@ -78,12 +71,11 @@ TEST(LandmarksNetworkNode, LeavesOutWhatItDoesNotSeeOrKnow) {
   ASSERT_EQ(answer.landmarks.seen.size(), 1u) << "the bright one's map reaches 0.75 only";
   EXPECT_EQ(answer.landmarks.seen[0].name, "dark");
   EXPECT_EQ(answer.landmarks.points.size(), 3u);
-  EXPECT_EQ(answer.said,
-            std::vector<std::string>{"the network does not know 'patella'; these points are not looked for"});
+  EXPECT_EQ(answer.said, Strings{"the network does not know 'patella'; these points are not looked for"});
   const Answer none = found(written, {"bright"}, {{"least", 0.9}});
   EXPECT_TRUE(none.landmarks.seen.empty());
-  EXPECT_EQ(none.said, std::vector<std::string>{"the network sees none of the points; is it made for this bone and for "
-                                                "images like these?"});
+  EXPECT_EQ(none.said, Strings{"the network sees none of the points; is it made for this bone and for "
+                               "images like these?"});
 }
 
 TEST(LandmarksNetworkNode, SeesTheSameInAMirror) {
@@ -95,7 +87,7 @@ TEST(LandmarksNetworkNode, SeesTheSameInAMirror) {
 
 TEST(LandmarksNetworkNode, RefusesPointsAndNetworksThatDoNotFit) {
   const Written written = network();
-  const auto refusal = [&](const std::vector<std::string>& names, const Written& of) {
+  const auto refusal = [&](const Strings& names, const Written& of) {
     return shipped::refusal("landmarks.network", inputs(names), {{"network", of.file().string()}});
   };
   EXPECT_EQ(refusal({"drak"}, written),
@@ -105,4 +97,4 @@ TEST(LandmarksNetworkNode, RefusesPointsAndNetworksThatDoNotFit) {
   EXPECT_NE(refusal({"dark"}, edges).find("heat_maps"), std::string::npos) << refusal({"dark"}, edges);
 }
 
-}  // namespace network_test
+}  // namespace marrow::test::network_test

@@ -1,12 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <gtest/gtest.h>
-
 #include "marrow/toolbox/analytic/body.hpp"
-#include "shipped.hpp"
+#include "tests/harness/node_test.hpp"
 
-namespace template_matching_test {
-
-using namespace marrow;
+namespace marrow::test::template_matching_test {
 
 constexpr int kSize_px = 240;
 
@@ -29,21 +25,21 @@ View view_of(const RigidTransform& world_from_ct) {
   return view;
 }
 
-shipped::Inputs inputs(const View& view, const RigidTransform& start) {
+Inputs inputs(const View& view, const RigidTransform& start) {
   Landmarks points;
   points.points = {{"lateral", {35, -5, -38}}, {"medial", {-35, 8, -32}}};
   List<View> views;
   views.add(view.name, view);
   Pose pose;
   pose.world_from_model = start;
-  return {{"points", shipped::item(points)},
+  return {{"points", item(points)},
           {"views", shipped::list(views, "view")},
           {"projector", Value::of<RadiographProjector>(std::make_shared<const analytic::BodyProjector>(bone()))},
-          {"start", shipped::item(pose)}};
+          {"start", item(pose)}};
 }
 
-Landmarks found(const View& view, const RigidTransform& start, const shipped::Options& options = {}) {
-  return shipped::call("landmarks.template_matching", inputs(view, start), options).at("landmarks").as<Landmarks>();
+Landmarks found(const View& view, const RigidTransform& start, const Options& options = {}) {
+  return output<Landmarks>("landmarks.template_matching", "landmarks", inputs(view, start), options);
 }
 
 double worst_px(const Landmarks& landmarks, const View& view, const RigidTransform& truth) {
@@ -57,9 +53,9 @@ double worst_px(const Landmarks& landmarks, const View& view, const RigidTransfo
 
 /// A start that a turn about the beam and a shift across it lead to: the picture moves and hardly changes.
 RigidTransform start_of(const View& view, double turn_deg) {
-  const Eigen::Matrix3d camera_from_world = view.camera.camera_from_world.rotation;
+  const Matrix3d camera_from_world = view.camera.camera_from_world.rotation;
   return analytic::moved_by(radians(turn_deg) * camera_from_world.row(2).transpose(),
-                            camera_from_world.transpose() * Eigen::Vector3d(5, -4, 0));
+                            camera_from_world.transpose() * Vector3d(5, -4, 0));
 }
 
 TEST(TemplateMatching, FollowsAShift) {
@@ -99,9 +95,9 @@ TEST(TemplateMatching, SeesNothingWhereNothingIsAlike) {
 
 TEST(TemplateMatching, RefusesAStartBehindTheSource) {
   const View shown = view_of(unmoved());
-  EXPECT_EQ(shipped::refusal("landmarks.template_matching",
-                             inputs(shown, analytic::moved_by({0, 0, 0}, 2 * source_position_mm(shown.camera)))),
+  EXPECT_EQ(refusal("landmarks.template_matching",
+                    inputs(shown, analytic::moved_by({0, 0, 0}, 2 * source_position_mm(shown.camera)))),
             "view 'frontal': the start puts the points behind the source; is it in the world's frame?");
 }
 
-}  // namespace template_matching_test
+}  // namespace marrow::test::template_matching_test

@@ -1,28 +1,20 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <gtest/gtest.h>
-
-#include <Eigen/Geometry>
-#include <cmath>
-
 #include "tests/plugins/plan/implants.hpp"
 
-namespace mask_body_test {
+namespace marrow::test::mask_body_test {
 
 TEST(MaskBody, LeavesOutTheBodyAndAMargin) {
-  const marrow::Value volume =
-      shipped::call("volume.filled_surface", {{"mesh", shipped::item(implants::rod().surface)}}).at("volume");
-  const marrow::Value projector = shipped::call("project.joseph", {{"volume", volume}}).at("projector");
-  marrow::View view = implants::views()[0];
+  const Value volume = call("volume.filled_surface", {{"mesh", item(implants::rod().surface)}}).at("volume");
+  const Value projector = call("project.joseph", {{"volume", volume}}).at("projector");
+  View view = implants::views()[0];
   view.mask = cv::Mat(512, 512, CV_8U, cv::Scalar(255));
   view.mask.at<std::uint8_t>(7, 9) = 0;
   const auto mask_of = [&](int margin_px) {
-    return shipped::call("mask.body",
-                         {{"view", shipped::item(view)},
-                          {"projector", projector},
-                          {"pose", shipped::item(implants::pose({0, 0, 0}, {0, 0, 50}, {0, 0, 0}))}},
-                         {{"margin_px", margin_px}})
-        .at("view")
-        .as<marrow::View>()
+    return output<View>("mask.body", "view",
+                        {{"view", item(view)},
+                         {"projector", projector},
+                         {"pose", item(implants::pose({0, 0, 0}, {0, 0, 50}, {0, 0, 0}))}},
+                        {{"margin_px", margin_px}})
         .mask;
   };
   // The rod is 10 mm wide: 10 * 1000 / 600 / 0.586 = 28.4 px around the middle column 255.5.
@@ -38,19 +30,17 @@ TEST(MaskBody, LeavesOutTheBodyAndAMargin) {
 }
 
 /// What is left of a view within 10 mm of a rod's hole.
-cv::Mat near_hole(const marrow::View& view) {
-  return shipped::call("mask.near_holes",
-                       {{"view", shipped::item(view)},
-                        {"implant", shipped::item(implants::rod())},
-                        {"pose", shipped::item(implants::pose({0, 0, 0}, {0, 0, 50}, {0, 0, 0}))}},
-                       {{"reach_mm", 10.0}})
-      .at("view")
-      .as<marrow::View>()
+cv::Mat near_hole(const View& view) {
+  return output<View>("mask.near_holes", "view",
+                      {{"view", item(view)},
+                       {"implant", item(implants::rod())},
+                       {"pose", item(implants::pose({0, 0, 0}, {0, 0, 50}, {0, 0, 0}))}},
+                      {{"reach_mm", 10.0}})
       .mask;
 }
 
 TEST(MaskNearHoles, KeepsOnlyWhatIsNearAHole) {
-  marrow::View view = implants::views()[0];
+  View view = implants::views()[0];
   view.mask = cv::Mat(512, 512, CV_8U, cv::Scalar(255));
   view.mask.at<std::uint8_t>(256, 256) = 0;
   const cv::Mat mask = near_hole(view);
@@ -63,7 +53,7 @@ TEST(MaskNearHoles, KeepsOnlyWhatIsNearAHole) {
 }
 
 TEST(MaskNearHoles, KeepsADiscInThePatientAlsoWherePixelsAreNotSquare) {
-  marrow::View view = implants::views()[0];
+  View view = implants::views()[0];
   view.camera.intrinsics.row(1) *= 0.5;  // pixels twice as high as wide
   const cv::Mat mask = near_hole(view);
   // The hole is at (255.5, 127.75). 10 mm are 28.4 px along u and 14.2 px along v.
@@ -72,7 +62,7 @@ TEST(MaskNearHoles, KeepsADiscInThePatientAlsoWherePixelsAreNotSquare) {
   EXPECT_EQ(at(255 + 30, 128), 0);
   EXPECT_EQ(at(256, 127 + 14), 255);
   EXPECT_EQ(at(256, 127 + 16), 0);
-  EXPECT_NEAR(cv::countNonZero(mask), marrow::kPi * 28.44 * 14.22, 15);
+  EXPECT_NEAR(cv::countNonZero(mask), kPi * 28.44 * 14.22, 15);
 }
 
-}  // namespace mask_body_test
+}  // namespace marrow::test::mask_body_test

@@ -1,19 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 // Grey values in steps: air 60000, a limb 30000 with a stripe of bone 20000, two plates of metal 5000 and 4500 in it, a
 // cable as dark, and the dark outside of the field at the border.
-#include <gtest/gtest.h>
+#include "tests/harness/node_test.hpp"
 
-#include <algorithm>
-#include <marrow/domain/camera.hpp>
-
-#include "shipped.hpp"
-
-namespace mask_threshold_test {
+namespace marrow::test::mask_threshold_test {
 
 const cv::Rect kLarge(60, 70, 40, 30), kSmall(110, 80, 20, 20);
 
-marrow::View view() {
-  marrow::View view{"front", {cv::Mat(200, 200, CV_16U, cv::Scalar(60000))}, {}, {}};
+View view() {
+  View view{"front", {cv::Mat(200, 200, CV_16U, cv::Scalar(60000))}, {}, {}};
   view.camera.width_px = view.camera.height_px = 200;
   view.camera.intrinsics << 900, 0, 99.5, 0, 900, 99.5, 0, 0, 1;
   cv::Mat& pixels = view.image.pixels;
@@ -34,9 +29,8 @@ void expect_box(const cv::Rect& box, const cv::Rect& expected) {
 }
 
 /// The box of what is kept, and how much of it is kept.
-std::pair<cv::Rect, int> kept(const marrow::View& view, const shipped::Options& options) {
-  const cv::Mat mask =
-      shipped::call("mask.threshold", {{"view", shipped::item(view)}}, options).at("view").as<marrow::View>().mask;
+std::pair<cv::Rect, int> kept(const View& view, const Options& options) {
+  const cv::Mat mask = output<View>("mask.threshold", "view", {{"view", item(view)}}, options).mask;
   cv::Rect box;
   for (int v = 0; v < mask.rows; ++v)
     for (int u = 0; u < mask.cols; ++u)
@@ -57,13 +51,13 @@ TEST(MaskThreshold, KeepsTheOutsideIfAsked) {
 }
 
 TEST(MaskThreshold, TakesImagesOf8Bits) {
-  marrow::View small = view();
+  View small = view();
   small.image.pixels.convertTo(small.image.pixels, CV_8U, 1.0 / 256);
   expect_box(kept(small, {}).first, kLarge);
 }
 
 TEST(MaskThreshold, TakesTheGivenValue) {
-  marrow::View no_cable = view();
+  View no_cable = view();
   no_cable.image.pixels(cv::Rect(0, 85, 200, 3)).setTo(30000);
   no_cable.image.pixels(kSmall).setTo(4500);
   expect_box(kept(no_cable, {{"grey_value", 4800.0}}).first, kSmall);  // the larger plate is brighter
@@ -71,19 +65,18 @@ TEST(MaskThreshold, TakesTheGivenValue) {
 
 TEST(MaskThreshold, LeavesOutSmallRegions) {
   // The smaller plate has 1 % of the image.
-  EXPECT_NE(shipped::refusal("mask.threshold", {{"view", shipped::item(view())}},
-                             {{"region", std::int64_t(2)}, {"least_percent", 1.5}}),
+  EXPECT_NE(refusal("mask.threshold", {{"view", item(view())}}, {{"region", std::int64_t(2)}, {"least_percent", 1.5}}),
             "");
 }
 
 TEST(MaskThreshold, KeepsWhatIsBright) {
-  marrow::View inverse = view();
+  View inverse = view();
   inverse.image.pixels = 65535 - inverse.image.pixels;
   expect_box(kept(inverse, {{"bright", true}}).first, kLarge);
 }
 
 TEST(MaskThreshold, LeavesOutWhatWasLeftOut) {
-  marrow::View masked = view();
+  View masked = view();
   masked.mask = cv::Mat(200, 200, CV_8U, cv::Scalar(255));
   masked.mask(kLarge).setTo(0);
   expect_box(kept(masked, {{"grey_value", 10000.0}}).first, kSmall);
@@ -91,9 +84,9 @@ TEST(MaskThreshold, LeavesOutWhatWasLeftOut) {
 
 TEST(MaskThreshold, SaysIfThereAreTooFewRegions) {
   EXPECT_EQ(
-      shipped::refusal("mask.threshold", {{"view", shipped::item(view())}}, {{"region", std::int64_t(3)}}),
+      refusal("mask.threshold", {{"view", item(view())}}, {{"region", std::int64_t(3)}}),
       "mask.threshold: view 'front': no grey value gives 3 regions away from the image's border; give a grey_value, "
       "or another mask");
 }
 
-}  // namespace mask_threshold_test
+}  // namespace marrow::test::mask_threshold_test

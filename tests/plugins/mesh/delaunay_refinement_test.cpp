@@ -1,25 +1,18 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Linked to CGAL's surface mesher, as the node mesh.delaunay is.
-#include "plugins/mesh/delaunay_refinement.hpp"
-
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <array>
 #include <set>
 
 #include "marrow/mesh/signs.hpp"
+#include "plugins/mesh/delaunay_refinement.hpp"
 #include "tests/plugins/mesh/shapes.hpp"
 
-namespace delaunay_refinement_test {
-
-using Eigen::Vector3d;
+namespace marrow::test::delaunay_refinement_test {
 
 /// A field as a level set around its middle, with a spacing of 1 mm. It is trilinear; beyond one layer around the grid
 /// all is outside.
-marrow::delaunay::LevelSet level_set_of(const marrow::SignedField& field, const Vector3d& middle) {
-  marrow::delaunay::LevelSet level_set;
-  const marrow::surface::Padded padded(field);
+delaunay::LevelSet level_set_of(const SignedField& field, const Vector3d& middle) {
+  delaunay::LevelSet level_set;
+  const surface::Padded padded(field);
   level_set.value = [padded, middle, size = field.grid.size](const Vector3d& p) -> double {
     const Vector3d index = p + middle, first = index.array().floor().matrix(), part = index - first;
     for (int axis = 0; axis < 3; ++axis)
@@ -31,7 +24,7 @@ marrow::delaunay::LevelSet level_set_of(const marrow::SignedField& field, const 
     }
     return sum < 0 ? sum : std::max(sum, 1e-12);
   };
-  const marrow::surface::Signs signs(field);
+  const surface::Signs signs(field);
   std::set<std::array<int, 3>> blocks;  // of two samples; a point in each
   signs.for_edges([&](int axis, int x, int y, int z) {
     if (blocks.insert({x / 2, y / 2, z / 2}).second)
@@ -42,11 +35,11 @@ marrow::delaunay::LevelSet level_set_of(const marrow::SignedField& field, const 
 
 TEST(Delaunay, StopsWhereTheFieldIsTooRoughForWhatIsAsked) {
   const auto field = mesh_shapes::noise_field({9, 8, 10}, 3, 0.4);
-  marrow::delaunay::LevelSet level_set = level_set_of(field, Vector3d(4, 3.5, 4.5));
+  delaunay::LevelSet level_set = level_set_of(field, Vector3d(4, 3.5, 4.5));
   level_set.radius_mm = 12;
-  const auto surface = marrow::delaunay::mesh(level_set, {30, 0.05, 0.01, 3000}, [] {});
+  const auto surface = delaunay::mesh(level_set, {30, 0.05, 0.01, 3000}, [] {});
   EXPECT_FALSE(surface.complete);
   EXPECT_LT(surface.vertices_mm.size(), 5000u);
 }
 
-}  // namespace delaunay_refinement_test
+}  // namespace marrow::test::delaunay_refinement_test

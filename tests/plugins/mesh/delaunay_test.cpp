@@ -1,25 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <gtest/gtest.h>
-
 #include <tbb/parallel_for.h>
-
-#include <algorithm>
-#include <array>
 #include <atomic>
-#include <cmath>
 
 #include "tests/plugins/mesh/shapes.hpp"
 
-namespace delaunay_test {
-
-using Eigen::Vector3d;
-using marrow::kPi;
-using marrow::Mesh;
-using marrow::SignedField;
+namespace marrow::test::delaunay_test {
 
 constexpr const char* kNode = "mesh.delaunay";
 
-Mesh mesh_of(const SignedField& field, const shipped::Options& options = {}) {
+Mesh mesh_of(const SignedField& field, const Options& options = {}) {
   return mesh_shapes::meshed(kNode, field, options);
 }
 
@@ -63,8 +52,8 @@ TEST(Delaunay, KeepsApartWhatOneSampleParts) {
 TEST(Delaunay, FindsPartsMuchSmallerThanItsTriangles) {
   for (unsigned inside = 1; inside < 256; ++inside) {
     const Mesh mesh = mesh_of(mesh_shapes::pattern_field(inside, false), {{"largest_only", false}});
-    EXPECT_TRUE(marrow::is_manifold(mesh)) << "pattern " << inside;
-    EXPECT_GT(marrow::enclosed_volume_mm3(mesh), 0);
+    EXPECT_TRUE(is_manifold(mesh)) << "pattern " << inside;
+    EXPECT_GT(enclosed_volume_mm3(mesh), 0);
   }
 }
 
@@ -84,8 +73,8 @@ TEST(Delaunay, SameBytesWhereverItsMemoryLies) {
 TEST(Delaunay, NoiseIsClosedOrRefusedInWords) {
   int refused = 0;
   for (unsigned seed = 0; seed < 12; ++seed) try {
-      EXPECT_TRUE(marrow::is_manifold(mesh_of(mesh_shapes::noise_field({9, 8, 10}, seed, 0.4)))) << "seed " << seed;
-    } catch (const marrow::Error& error) {
+      EXPECT_TRUE(is_manifold(mesh_of(mesh_shapes::noise_field({9, 8, 10}, seed, 0.4)))) << "seed " << seed;
+    } catch (const Error& error) {
       ++refused;
       EXPECT_EQ(std::string(error.what()).rfind("field: Delaunay refinement does not close its surface: ", 0), 0u)
           << error.what();
@@ -95,11 +84,11 @@ TEST(Delaunay, NoiseIsClosedOrRefusedInWords) {
 
 TEST(Delaunay, CanBeCancelled) {
   std::atomic<bool> cancelled = true;
-  marrow::Context::Hooks hooks;
+  Context::Hooks hooks;
   hooks.cancelled = &cancelled;
   const auto field = mesh_shapes::field_of(mesh_shapes::turned_grid({48, 48, 40}),
                                            [](const Vector3d& p) { return mesh_shapes::sphere(p, 15); });
-  EXPECT_THROW(shipped::call(kNode, {{"field", shipped::item(field)}}, {}, marrow::Context(hooks)), marrow::Cancelled);
+  EXPECT_THROW(call(kNode, {{"field", item(field)}}, {}, Context(hooks)), Cancelled);
 }
 
-}  // namespace delaunay_test
+}  // namespace marrow::test::delaunay_test

@@ -1,32 +1,22 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <cmath>
-
 #include "tests/plugins/mesh/shapes.hpp"
 
-namespace flying_edges_test {
-
-using Eigen::Vector3d;
-using marrow::kPi;
-using marrow::Mesh;
-using marrow::SignedField;
+namespace marrow::test::flying_edges_test {
 
 constexpr const char* kNode = "mesh.flying_edges";
 
-Mesh flying_edges(const SignedField& field, const shipped::Options& options = {}) {
+Mesh flying_edges(const SignedField& field, const Options& options = {}) {
   return mesh_shapes::meshed(kNode, field, options);
 }
 
 TEST(FlyingEdges, ClosesHalfAVoxelBeyondTheBorder) {
-  marrow::Grid grid;
+  Grid grid;
   grid.size = {40, 40, 11};
   grid.spacing_mm = {1, 1, 2};
   const Mesh mesh = flying_edges(
       mesh_shapes::field_of(grid, [](const Vector3d& p) { return std::hypot(p.x() - 19.7, p.y() - 19.4) - 10; }));
-  EXPECT_TRUE(marrow::is_closed(mesh));
-  EXPECT_NEAR(marrow::enclosed_volume_mm3(mesh) / (kPi * 100 * 22), 1, 8e-3);
+  EXPECT_TRUE(is_closed(mesh));
+  EXPECT_NEAR(enclosed_volume_mm3(mesh) / (kPi * 100 * 22), 1, 8e-3);
 }
 
 TEST(FlyingEdges, KeepsTheLargestPart) {
@@ -35,7 +25,7 @@ TEST(FlyingEdges, KeepsTheLargestPart) {
   });
   const Mesh largest = flying_edges(field);
   EXPECT_EQ(mesh_shapes::euler_number(largest), 2);
-  EXPECT_NEAR(marrow::enclosed_volume_mm3(largest) / (4.0 / 3 * kPi * 14 * 14 * 14), 1, 3e-3);
+  EXPECT_NEAR(enclosed_volume_mm3(largest) / (4.0 / 3 * kPi * 14 * 14 * 14), 1, 3e-3);
 }
 
-}  // namespace flying_edges_test
+}  // namespace marrow::test::flying_edges_test

@@ -1,17 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // What every node must do that makes a mesh from a field.
-#include <gtest/gtest.h>
-
-#include <cmath>
-
 #include "tests/plugins/mesh/shapes.hpp"
 
-namespace meshers_test {
-
-using Eigen::Vector3d;
-using marrow::kPi;
-using marrow::Mesh;
-using marrow::SignedField;
+namespace marrow::test::meshers_test {
 
 /// A node, and how far its meshes may be off. Volumes are fractions of the true one.
 struct Node {
@@ -23,11 +14,11 @@ void PrintTo(const Node& node, std::ostream* stream) { *stream << node.name; }
 
 class Mesher : public testing::TestWithParam<Node> {
  protected:
-  static Mesh mesh_of(const SignedField& field, const shipped::Options& options = {}) {
+  static Mesh mesh_of(const SignedField& field, const Options& options = {}) {
     return mesh_shapes::meshed(std::string("mesh.") + GetParam().name, field, options);
   }
   static std::string refusal(const SignedField& field) {
-    return shipped::refusal(std::string("mesh.") + GetParam().name, {{"field", shipped::item(field)}});
+    return shipped::refusal(std::string("mesh.") + GetParam().name, {{"field", item(field)}});
   }
 };
 INSTANTIATE_TEST_SUITE_P(, Mesher,
@@ -42,21 +33,21 @@ TEST_P(Mesher, SphereInATurnedGrid) {
   const mesh_shapes::Distance distance = [](const Vector3d& p) { return mesh_shapes::sphere(p, 15); };
   const Mesh mesh = mesh_of(mesh_shapes::field_of(mesh_shapes::turned_grid({48, 48, 40}), distance));
   EXPECT_EQ(mesh.frame, "scanner");
-  EXPECT_TRUE(marrow::is_closed(mesh));
-  EXPECT_TRUE(marrow::is_manifold(mesh));
+  EXPECT_TRUE(is_closed(mesh));
+  EXPECT_TRUE(is_manifold(mesh));
   EXPECT_EQ(mesh_shapes::euler_number(mesh), 2);
   EXPECT_LT(mesh_shapes::largest_error_mm(mesh, distance), GetParam().sphere_mm);
-  EXPECT_NEAR(marrow::enclosed_volume_mm3(mesh) / (4.0 / 3 * kPi * 15 * 15 * 15), 1, GetParam().sphere_volume);
+  EXPECT_NEAR(enclosed_volume_mm3(mesh) / (4.0 / 3 * kPi * 15 * 15 * 15), 1, GetParam().sphere_volume);
   EXPECT_TRUE(mesh_shapes::normals_point_outward(mesh, distance));
 }
 
 TEST_P(Mesher, Torus) {
   const mesh_shapes::Distance distance = [](const Vector3d& p) { return mesh_shapes::torus(p, 12, 5); };
   const Mesh mesh = mesh_of(mesh_shapes::field_of(mesh_shapes::turned_grid({50, 50, 50}), distance));
-  EXPECT_TRUE(marrow::is_closed(mesh));
-  EXPECT_TRUE(marrow::is_manifold(mesh));
+  EXPECT_TRUE(is_closed(mesh));
+  EXPECT_TRUE(is_manifold(mesh));
   EXPECT_EQ(mesh_shapes::euler_number(mesh), 0);
-  EXPECT_NEAR(marrow::enclosed_volume_mm3(mesh) / (2 * kPi * kPi * 12 * 25), 1, GetParam().torus_volume);
+  EXPECT_NEAR(enclosed_volume_mm3(mesh) / (2 * kPi * kPi * 12 * 25), 1, GetParam().torus_volume);
 }
 
 TEST_P(Mesher, EveryPatternIsAClosedManifold) {
@@ -65,8 +56,8 @@ TEST_P(Mesher, EveryPatternIsAClosedManifold) {
     for (unsigned inside = 0; inside < 256; ++inside) {
       if (inside == (around ? 255u : 0u)) continue;  // no surface
       const Mesh mesh = mesh_of(mesh_shapes::pattern_field(inside, around), {{"largest_only", false}});
-      EXPECT_TRUE(marrow::is_manifold(mesh)) << "pattern " << inside << (around ? " in the inside" : "");
-      EXPECT_GT(marrow::enclosed_volume_mm3(mesh), 0);
+      EXPECT_TRUE(is_manifold(mesh)) << "pattern " << inside << (around ? " in the inside" : "");
+      EXPECT_GT(enclosed_volume_mm3(mesh), 0);
     }
 }
 
@@ -88,4 +79,4 @@ TEST_P(Mesher, SaysWhatIsWrongWithAField) {
   }
 }
 
-}  // namespace meshers_test
+}  // namespace marrow::test::meshers_test

@@ -1,24 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <gtest/gtest.h>
-
 #include <tbb/parallel_for.h>
-
-#include <algorithm>
-#include <array>
-#include <cmath>
 
 #include "tests/plugins/mesh/shapes.hpp"
 
-namespace poisson_test {
-
-using Eigen::Vector3d;
-using marrow::kPi;
-using marrow::Mesh;
-using marrow::SignedField;
+namespace marrow::test::poisson_test {
 
 constexpr const char* kNode = "mesh.poisson";
 
-Mesh poisson(const SignedField& field, const shipped::Options& options = {}) {
+Mesh poisson(const SignedField& field, const Options& options = {}) {
   return mesh_shapes::meshed(kNode, field, options);
 }
 
@@ -26,7 +15,7 @@ TEST(Poisson, ClosesABoneThatIsCutByTheBorder) {
   const auto field = mesh_shapes::field_of(mesh_shapes::turned_grid({48, 48, 24}),
                                            [](const Vector3d& p) { return p.head<2>().norm() - 9; });
   const Mesh mesh = poisson(field);
-  EXPECT_TRUE(marrow::is_manifold(mesh));
+  EXPECT_TRUE(is_manifold(mesh));
   EXPECT_EQ(mesh_shapes::euler_number(mesh), 2);
 }
 
@@ -63,8 +52,8 @@ TEST(Poisson, NoiseIsClosedOrRefusedInWords) {
   for (unsigned seed = 0; seed < 12; ++seed) {
     const auto field = mesh_shapes::noise_field({9, 8, 10}, seed, 0.4);
     try {
-      EXPECT_TRUE(marrow::is_manifold(poisson(field))) << "seed " << seed;
-    } catch (const marrow::Error& error) {
+      EXPECT_TRUE(is_manifold(poisson(field))) << "seed " << seed;
+    } catch (const Error& error) {
       ++refused;
       EXPECT_STREQ(error.what(),
                    "field: the surface that fits its points is not closed, as Poisson reconstruction needs a smooth "
@@ -75,4 +64,4 @@ TEST(Poisson, NoiseIsClosedOrRefusedInWords) {
   std::printf("%d of 12 fields of noise refused\n", refused);
 }
 
-}  // namespace poisson_test
+}  // namespace marrow::test::poisson_test

@@ -1,22 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <gtest/gtest.h>
-
-#include <cmath>
-#include <random>
-
-#include "shipped.hpp"
-#include "tests/framework/domain/shapes.hpp"
 #include "tests/plugins/project/shapes.hpp"
 
-namespace smooth_test {
-
-using Eigen::Vector3d;
-using marrow::Mesh;
+namespace marrow::test::smooth_test {
 
 constexpr const char* kNode = "mesh.smooth";
 
-Mesh smooth(const Mesh& mesh, const shipped::Options& options = {}) {
-  return shipped::call(kNode, {{"mesh", shipped::item(mesh)}}, options).at("mesh").as<Mesh>();
+Mesh smooth(const Mesh& mesh, const Options& options = {}) {
+  return output<Mesh>(kNode, "mesh", {{"mesh", item(mesh)}}, options);
 }
 
 double roughness_mm(const Mesh& mesh, double radius_mm) {
@@ -34,7 +24,7 @@ TEST(Smooth, TakesNoiseAndKeepsTheVolume) {
   const Mesh smoothed = smooth(rough, {{"iterations", std::int64_t{20}}});
   EXPECT_EQ(smoothed.triangles, rough.triangles);
   EXPECT_LT(roughness_mm(smoothed, 25), 0.45 * roughness_mm(rough, 25));
-  EXPECT_NEAR(marrow::enclosed_volume_mm3(smoothed) / marrow::enclosed_volume_mm3(rough), 1, 2e-3);
+  EXPECT_NEAR(enclosed_volume_mm3(smoothed) / enclosed_volume_mm3(rough), 1, 2e-3);
   EXPECT_EQ(smooth(rough, {{"iterations", std::int64_t{0}}}).vertices_mm, rough.vertices_mm);
   EXPECT_LT(roughness_mm(smooth(rough, {{"iterations", std::int64_t{60}}, {"pass_band", 0.03}}), 25),
             roughness_mm(smoothed, 25))
@@ -48,21 +38,20 @@ TEST(Smooth, IsStableWhereverItIsAllowed) {
   std::mt19937 random(4);
   for (Vector3d& v : rough.vertices_mm)
     for (int axis = 0; axis < 3; ++axis) v[axis] += 0.2 * (double(random()) / double(std::mt19937::max()) - 0.5);
-  const double volume = marrow::enclosed_volume_mm3(rough), area = marrow::surface_area_mm2(rough);
+  const double volume = enclosed_volume_mm3(rough), area = surface_area_mm2(rough);
   int smoothed = 0, refused = 0;
   for (const int iterations : {1, 20, 200})
     for (const double lambda : {0.01, 0.5, 0.62, 0.7071})
       for (const double band : {0.001, 0.1, 0.3, 1.0}) {
-        const shipped::Options options{
-            {"iterations", std::int64_t{iterations}}, {"lambda", lambda}, {"pass_band", band}};
-        if (!shipped::refusal(kNode, {{"mesh", shipped::item(rough)}}, options).empty()) {
+        const Options options{{"iterations", std::int64_t{iterations}}, {"lambda", lambda}, {"pass_band", band}};
+        if (!shipped::refusal(kNode, {{"mesh", item(rough)}}, options).empty()) {
           ++refused;
           continue;
         }
         ++smoothed;
         const Mesh smooth_one = smooth(rough, options);
-        EXPECT_NEAR(marrow::enclosed_volume_mm3(smooth_one) / volume, 1, 0.05) << iterations << lambda << band;
-        EXPECT_LT(marrow::surface_area_mm2(smooth_one) / area, 1.15 * 1.15) << iterations << lambda << band;
+        EXPECT_NEAR(enclosed_volume_mm3(smooth_one) / volume, 1, 0.05) << iterations << lambda << band;
+        EXPECT_LT(surface_area_mm2(smooth_one) / area, 1.15 * 1.15) << iterations << lambda << band;
       }
   EXPECT_GT(smoothed, 12);
   EXPECT_GT(refused, 12);
@@ -72,9 +61,9 @@ TEST(Smooth, RefusesWhatMakesWavesGrow) {
   // By hand: |mu| = lambda / (1 - lambda pass_band); the shortest wave is multiplied by 1 - 2 lambda |mu| (2 -
   // pass_band), which is -1 at lambda = (sqrt(5) - 1) / 2 with a pass_band of 1. A wave of half the pass band grows by
   // 0.25 * 0.526 * 0.1^2 / 4 in each pair of steps of the defaults: 15 % in ln(1.15) / 0.000658 = 212.5 of them.
-  const Mesh box = marrow::test::box({0, 0, 0}, {20, 20, 20});
+  const Mesh box = test::box({0, 0, 0}, {20, 20, 20});
   const auto refusal = [&](std::int64_t iterations, double lambda, double band) {
-    return shipped::refusal(kNode, {{"mesh", shipped::item(box)}},
+    return shipped::refusal(kNode, {{"mesh", item(box)}},
                             {{"iterations", iterations}, {"lambda", lambda}, {"pass_band", band}});
   };
   EXPECT_EQ(refusal(1, 0.7, 1.0),
@@ -87,17 +76,17 @@ TEST(Smooth, RefusesWhatMakesWavesGrow) {
 }
 
 TEST(Smooth, LeavesVerticesOfNoTriangleWhereTheyAre) {
-  Mesh box = marrow::test::box({0, 0, 0}, {20, 20, 20});
+  Mesh box = test::box({0, 0, 0}, {20, 20, 20});
   box.vertices_mm.emplace_back(1, 2, 3);
   EXPECT_EQ(smooth(box).vertices_mm.back(), Vector3d(1, 2, 3));
 }
 
 TEST(Smooth, SaysWhatIsWrongWithAMesh) {
-  EXPECT_EQ(shipped::refusal(kNode, {{"mesh", shipped::item(Mesh{})}}), "mesh to smooth: the surface has no triangles");
-  Mesh open = marrow::test::box({0, 0, 0}, {20, 20, 20});
+  EXPECT_EQ(shipped::refusal(kNode, {{"mesh", item(Mesh{})}}), "mesh to smooth: the surface has no triangles");
+  Mesh open = box({0, 0, 0}, {20, 20, 20});
   open.triangles.pop_back();
-  EXPECT_EQ(shipped::refusal(kNode, {{"mesh", shipped::item(open)}}),
+  EXPECT_EQ(shipped::refusal(kNode, {{"mesh", item(open)}}),
             "mesh to smooth: it is not closed, as an edge has not just two triangles; a mesh node gives closed ones");
 }
 
-}  // namespace smooth_test
+}  // namespace marrow::test::smooth_test

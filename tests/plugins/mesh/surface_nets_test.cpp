@@ -1,18 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <gtest/gtest.h>
-
 #include <tbb/global_control.h>
-
-#include <cmath>
 
 #include "tests/plugins/mesh/shapes.hpp"
 
-namespace surface_nets_test {
-
-using Eigen::Vector3d;
-using marrow::kPi;
-using marrow::Mesh;
-using marrow::SignedField;
+namespace marrow::test::surface_nets_test {
 
 constexpr const char* kNode = "mesh.surface_nets";
 
@@ -23,8 +14,8 @@ Mesh nets(const SignedField& field, bool largest_only = true, int relaxation = 0
 TEST(SurfaceNets, NoiseIsAClosedManifold) {
   for (unsigned seed = 0; seed < 40; ++seed) {
     const auto field = mesh_shapes::noise_field({17, 14, 13}, seed, 0.2 + 0.015 * seed);
-    EXPECT_TRUE(marrow::is_manifold(nets(field, false))) << "seed " << seed;
-    EXPECT_TRUE(marrow::is_manifold(nets(field, false, 3))) << "seed " << seed;
+    EXPECT_TRUE(is_manifold(nets(field, false))) << "seed " << seed;
+    EXPECT_TRUE(is_manifold(nets(field, false, 3))) << "seed " << seed;
   }
 }
 
@@ -36,7 +27,7 @@ TEST(SurfaceNets, AFaceThatIsCrossedTwiceByTheSameTwoLoopsIsSplit) {
   field.values_mm.assign(125, -1);
   field.values_mm[field.grid.offset(2, 2, 2)] = field.values_mm[field.grid.offset(3, 3, 2)] = 1;
   const Mesh mesh = nets(field, false);
-  EXPECT_TRUE(marrow::is_manifold(mesh));
+  EXPECT_TRUE(is_manifold(mesh));
   int split = 0;
   for (const auto& v : mesh.vertices_mm) split += (v - Vector3d(2.5, 2.5, 2)).head<2>().norm() < 0.4 && v.z() == 2;
   EXPECT_EQ(split, 2) << "one vertex for each crossing of the face";
@@ -63,8 +54,8 @@ TEST(SurfaceNets, RelaxationTakesTheStepsOfABinaryField) {
   };
   const Mesh rough = nets(field), relaxed = nets(field, true, 5);
   EXPECT_LT(roughness(relaxed), 0.5 * roughness(rough));
-  EXPECT_TRUE(marrow::is_manifold(relaxed));
-  EXPECT_NEAR(marrow::enclosed_volume_mm3(relaxed) / (4.0 / 3 * kPi * 22 * 22 * 22), 1, 0.02);
+  EXPECT_TRUE(is_manifold(relaxed));
+  EXPECT_NEAR(enclosed_volume_mm3(relaxed) / (4.0 / 3 * kPi * 22 * 22 * 22), 1, 0.02);
   const Mesh long_relaxed = nets(field, true, 100);
   ASSERT_EQ(long_relaxed.vertices_mm.size(), rough.vertices_mm.size());
   for (std::size_t v = 0; v < rough.vertices_mm.size(); ++v) {  // both lie in the same cell, a sample wide
@@ -85,4 +76,4 @@ TEST(SurfaceNets, SameBytesAtAnyNumberOfThreads) {
   EXPECT_EQ(one.vertices_mm, two.vertices_mm);
 }
 
-}  // namespace surface_nets_test
+}  // namespace marrow::test::surface_nets_test

@@ -1,21 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
 // What every optimizer must do.
-#include <cmath>
-#include <limits>
-#include <utility>
-
 #include "optimizer_behaviour.hpp"
 
-namespace behaviour_test {
+namespace marrow::test::behaviour_test {
 
 using optimizer_behaviour::refusal_of, optimizer_behaviour::valley;
 
 class EveryOptimizer : public testing::TestWithParam<const char*> {
  protected:
-  const marrow::Optimizer& optimizer() const { return *optimizer_; }
+  const Optimizer& optimizer() const { return *optimizer_; }
 
  private:
-  const std::shared_ptr<const marrow::Optimizer> optimizer_ =
+  const std::shared_ptr<const Optimizer> optimizer_ =
       optimizer_behaviour::made_by(std::string("optimizer.") + GetParam());
 };
 /// Those that search near their start.
@@ -47,8 +43,8 @@ TEST_P(FineOptimizer, FindsTheMinimum) {
 
 TEST_P(FineOptimizer, KeepsToBoundsAndBudget) {
   auto problem = valley();
-  problem.lower = Eigen::Vector2d(-2, -2);
-  problem.upper = Eigen::Vector2d(0.5, 2);
+  problem.lower = Vector2d(-2, -2);
+  problem.upper = Vector2d(0.5, 2);
   int calls = 0;
   problem.observer = [&](int evaluation, const Eigen::VectorXd& x, double) {
     EXPECT_EQ(evaluation, ++calls);
@@ -70,7 +66,7 @@ TEST_P(FineOptimizer, KeepsToBoundsAndBudget) {
 TEST_P(LocalOptimizer, TakesNanForTheWorst) {
   auto problem = valley();
   problem.function = [](const Eigen::VectorXd& x) {
-    return x[0] > 2 ? std::numeric_limits<double>::quiet_NaN() : (x - Eigen::Vector2d(1.9, -1)).squaredNorm();
+    return x[0] > 2 ? std::numeric_limits<double>::quiet_NaN() : (x - Vector2d(1.9, -1)).squaredNorm();
   };
   const auto result = optimizer().minimise(problem);
   EXPECT_NEAR(result.x[0], 1.9, 0.01);
@@ -81,15 +77,15 @@ TEST_P(EveryOptimizer, LetsExceptionsPass) {
   auto problem = valley();
   int calls = 0;
   problem.function = [&](const Eigen::VectorXd& x) {
-    if (++calls == 5) throw marrow::Cancelled();
+    if (++calls == 5) throw Cancelled();
     return x.squaredNorm();
   };
-  EXPECT_THROW(optimizer().minimise(problem), marrow::Cancelled);
+  EXPECT_THROW(optimizer().minimise(problem), Cancelled);
   EXPECT_EQ(calls, 5);
 }
 
 TEST_P(EveryOptimizer, RefusesNonsense) {
-  const auto message = [&](const marrow::MinimisationProblem& problem) { return refusal_of(optimizer(), problem); };
+  const auto message = [&](const MinimisationProblem& problem) { return refusal_of(optimizer(), problem); };
   auto problem = valley();
   problem.initial_step[1] = 0;
   EXPECT_EQ(message(problem), "the optimizer needs a finite start and one positive initial step per coordinate");
@@ -97,7 +93,7 @@ TEST_P(EveryOptimizer, RefusesNonsense) {
   problem.lower = Eigen::VectorXd::Zero(3);
   EXPECT_EQ(message(problem), "the optimizer got bounds for 3 of 2 coordinates");
   problem = valley();
-  problem.lower = Eigen::Vector2d(0, 0);
+  problem.lower = Vector2d(0, 0);
   EXPECT_EQ(message(problem), "the optimizer's start lies outside the bounds");
   problem = valley();
   problem.max_evaluations = 0;
@@ -106,7 +102,7 @@ TEST_P(EveryOptimizer, RefusesNonsense) {
   problem.start = problem.initial_step = Eigen::VectorXd();
   EXPECT_EQ(message(problem), "the optimizer got a start without coordinates; it needs one at least");
   problem = valley();
-  problem.upper = Eigen::Vector2d(9, std::nan(""));
+  problem.upper = Vector2d(9, std::nan(""));
   EXPECT_EQ(message(problem), "the optimizer got a bound that is not a number");
   const std::pair<double, std::string> tolerances[] = {
       {std::nan(""), "nan"}, {0, "0"}, {-0.5, "-0.5"}, {std::numeric_limits<double>::infinity(), "inf"}};
@@ -130,4 +126,4 @@ TEST_P(EveryOptimizer, RefusesWhatIsNowhereFinite) {
   }
 }
 
-}  // namespace behaviour_test
+}  // namespace marrow::test::behaviour_test

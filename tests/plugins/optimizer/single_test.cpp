@@ -1,16 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 // What single optimizers do besides what every one must do.
-#include <cmath>
-#include <limits>
-
 #include "optimizer_behaviour.hpp"
 
-namespace single_test {
+namespace marrow::test::single_test {
 
 using optimizer_behaviour::made_by, optimizer_behaviour::refusal_of, optimizer_behaviour::valley;
 
 TEST(Bobyqa, RefusesOneDimension) {
-  marrow::MinimisationProblem problem;
+  MinimisationProblem problem;
   problem.function = [](const Eigen::VectorXd& x) { return x.squaredNorm(); };
   problem.start = problem.initial_step = Eigen::VectorXd::Ones(1);
   EXPECT_EQ(refusal_of(*made_by("optimizer.bobyqa"), problem),
@@ -19,15 +16,15 @@ TEST(Bobyqa, RefusesOneDimension) {
 
 TEST(Bobyqa, SaysWhichBoundsAreTooNear) {
   auto problem = valley();
-  problem.lower = Eigen::Vector2d(-2, 0.75);
-  problem.upper = Eigen::Vector2d(2, 1.25);
+  problem.lower = Vector2d(-2, 0.75);
+  problem.upper = Vector2d(2, 1.25);
   EXPECT_EQ(refusal_of(*made_by("optimizer.bobyqa"), problem),
             "BOBYQA needs bounds that are two initial steps apart: those of coordinate 2 are 0.5 apart, and its step "
             "is 0.5; use smaller steps or another optimizer");
-  problem.initial_step = Eigen::Vector2d(0.5, 0.2);
+  problem.initial_step = Vector2d(0.5, 0.2);
   const auto result = made_by("optimizer.bobyqa")->minimise(problem);
   // By hand: along the valley y = x^2 from the start, where x is negative, the least is nearest to (1, 1) at y = 0.75.
-  EXPECT_LE(result.value, problem.function(Eigen::Vector2d(-std::sqrt(0.75), 0.75)) + 1e-3);
+  EXPECT_LE(result.value, problem.function(Vector2d(-std::sqrt(0.75), 0.75)) + 1e-3);
 }
 
 TEST(Direct, LeavesLocalMinima) {
@@ -35,10 +32,10 @@ TEST(Direct, LeavesLocalMinima) {
   // Rastrigin's function about (1.3, -0.7): a minimum about every whole number.
   problem.function = [](const Eigen::VectorXd& x) {
     double sum = 0;
-    for (const double d : {x[0] - 1.3, x[1] + 0.7}) sum += d * d + 10 * (1 - std::cos(2 * marrow::kPi * d));
+    for (const double d : {x[0] - 1.3, x[1] + 0.7}) sum += d * d + 10 * (1 - std::cos(2 * kPi * d));
     return sum;
   };
-  problem.start = Eigen::Vector2d(-2, 3);
+  problem.start = Vector2d(-2, 3);
   const auto result = made_by("optimizer.direct")->minimise(problem);
   EXPECT_NEAR(result.x[0], 1.3, 0.01);
   EXPECT_NEAR(result.x[1], -0.7, 0.01);
@@ -46,7 +43,7 @@ TEST(Direct, LeavesLocalMinima) {
 TEST(Direct, TakesNanForTheWorst) {
   auto problem = valley();
   problem.function = [](const Eigen::VectorXd& x) {
-    return x[0] > 2 ? std::nan("") : (x - Eigen::Vector2d(1.2, -1)).squaredNorm();
+    return x[0] > 2 ? std::nan("") : (x - Vector2d(1.2, -1)).squaredNorm();
   };
   const auto result = made_by("optimizer.direct")->minimise(problem);
   EXPECT_NEAR(result.x[0], 1.2, 0.02) << "boxes whose middle is not a number are divided last";
@@ -55,7 +52,7 @@ TEST(Direct, TakesNanForTheWorst) {
 
 /// Evaluations and distance from the lowest point of a bowl in six dimensions.
 std::pair<int, double> bowl(double tolerance) {
-  marrow::MinimisationProblem problem;
+  MinimisationProblem problem;
   const Eigen::VectorXd lowest = Eigen::VectorXd::LinSpaced(6, -1.3, 2.1);
   problem.function = [&](const Eigen::VectorXd& x) { return (x - lowest).squaredNorm(); };
   problem.start = Eigen::VectorXd::Zero(6);
@@ -81,9 +78,9 @@ TEST(Direct, EndsWhenItsBoxIsSmall) {
 TEST(Direct, TakesItsOwnRangeWhereABoundIsInfinite) {
   auto problem = valley();
   const double infinite = std::numeric_limits<double>::infinity();
-  problem.lower = Eigen::Vector2d(-infinite, 0);
-  problem.upper = Eigen::Vector2d(infinite, infinite);
-  problem.function = [](const Eigen::VectorXd& x) { return (x - Eigen::Vector2d(2, -1)).squaredNorm(); };
+  problem.lower = Vector2d(-infinite, 0);
+  problem.upper = Vector2d(infinite, infinite);
+  problem.function = [](const Eigen::VectorXd& x) { return (x - Vector2d(2, -1)).squaredNorm(); };
   const auto result = made_by("optimizer.direct")->minimise(problem);
   EXPECT_NEAR(result.x[0], 2, 1e-3);
   EXPECT_NEAR(result.x[1], 0, 1e-3);
@@ -91,7 +88,7 @@ TEST(Direct, TakesItsOwnRangeWhereABoundIsInfinite) {
 
 TEST(Grid, FollowsTheBestAndBecomesFiner) {
   auto problem = valley();
-  problem.function = [](const Eigen::VectorXd& x) { return (x - Eigen::Vector2d(3.21, -0.4)).squaredNorm(); };
+  problem.function = [](const Eigen::VectorXd& x) { return (x - Vector2d(3.21, -0.4)).squaredNorm(); };
   problem.step_tolerance = 1e-4;
   const auto result = made_by("optimizer.grid")->minimise(problem);
   EXPECT_NEAR(result.x[0], 3.21, 1e-3);
@@ -100,7 +97,7 @@ TEST(Grid, FollowsTheBestAndBecomesFiner) {
 }
 
 TEST(Grid, RefusesAnEvenNumberOfPoints) {
-  EXPECT_EQ(shipped::refusal("optimizer.grid", {}, {{"grid_points", std::int64_t{4}}}),
+  EXPECT_EQ(refusal("optimizer.grid", {}, {{"grid_points", std::int64_t{4}}}),
             "grid_points: expected an odd number, so that the middle is one of them, got 4");
 }
 
@@ -108,24 +105,23 @@ TEST(Lbfgs, UsesDerivatives) {
   auto problem = valley();
   problem.expansion = [&](const Eigen::VectorXd& x) {
     const double bend = x[1] - x[0] * x[0];
-    return marrow::MinimisationProblem::Expansion{problem.function(x),
-                                                  Eigen::Vector2d(-2 * (1 - x[0]) - 400 * x[0] * bend, 200 * bend),
-                                                  Eigen::Matrix2d::Identity()};
+    return MinimisationProblem::Expansion{
+        problem.function(x), Vector2d(-2 * (1 - x[0]) - 400 * x[0] * bend, 200 * bend), Eigen::Matrix2d::Identity()};
   };
   const auto result = made_by("optimizer.lbfgs")->minimise(problem);
-  EXPECT_NEAR((result.x - Eigen::Vector2d(1, 1)).norm(), 0, 1e-5);
+  EXPECT_NEAR((result.x - Vector2d(1, 1)).norm(), 0, 1e-5);
   EXPECT_LT(result.evaluations, 150);
 }
 
 // The valley is the sum of the squares of r = (10 (y - x^2), 1 - x).
-marrow::MinimisationProblem valley_of_squares() {
+MinimisationProblem valley_of_squares() {
   auto problem = valley();
   problem.expansion = [](const Eigen::VectorXd& x) {
-    const Eigen::Vector2d r(10 * (x[1] - x[0] * x[0]), 1 - x[0]);
+    const Vector2d r(10 * (x[1] - x[0] * x[0]), 1 - x[0]);
     Eigen::Matrix2d jacobian;
     jacobian << -20 * x[0], 10, -1, 0;
-    return marrow::MinimisationProblem::Expansion{3 + r.squaredNorm(), 2 * jacobian.transpose() * r,
-                                                  2 * jacobian.transpose() * jacobian};
+    return MinimisationProblem::Expansion{3 + r.squaredNorm(), 2 * jacobian.transpose() * r,
+                                          2 * jacobian.transpose() * jacobian};
   };
   return problem;
 }
@@ -150,4 +146,4 @@ TEST(LevenbergMarquardt, SurvivesDerivativesThatAreNoNumbers) {
   EXPECT_NEAR(made_by("optimizer.levenberg_marquardt")->minimise(problem).value, 3, 1e-4);
 }
 
-}  // namespace single_test
+}  // namespace marrow::test::single_test

@@ -1,28 +1,21 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <gtest/gtest.h>
-
-#include <Eigen/Geometry>
-#include <cmath>
-#include <marrow/domain/functions.hpp>
 #include <marrow/domain/random.hpp>
-#include <marrow/domain/verdict.hpp>
 
 #include "tests/plugins/plan/implants.hpp"
 
-namespace locking_test {
+namespace marrow::test::locking_test {
 
-using Eigen::Vector2d, Eigen::Vector3d;
+using geometry::Implant, geometry::LockingPlan;
 using implants::inputs, implants::pose, implants::rod;
-using marrow::geometry::Implant, marrow::geometry::LockingPlan;
 
-LockingPlan::Drill drill_of(const marrow::Pose& at, const shipped::Options& options = {}) {
+LockingPlan::Drill drill_of(const Pose& at, const Options& options = {}) {
   return implants::locking(rod(), at, options).at("plan").as<LockingPlan>().drills.at(0);
 }
 
 TEST(PlanLocking, AxisAndGuideFollowThePose) {
   // A quarter turn about z brings the hole's axis from x to y. The drill comes from +y.
-  const marrow::Pose at = pose({0, 0, marrow::kPi / 2}, {0, 0, 50}, {3, -4, 12});
-  const auto drill = drill_of(at, {{"from", std::vector<double>{0, 1, 0}}, {"guide_mm", 80.0}});
+  const Pose at = pose({0, 0, kPi / 2}, {0, 0, 50}, {3, -4, 12});
+  const auto drill = drill_of(at, {{"from", Numbers{0, 1, 0}}, {"guide_mm", 80.0}});
   EXPECT_EQ(drill.hole, "distal");
   EXPECT_TRUE(drill.centre_mm.isApprox(Vector3d(3, -4, 12), 1e-12));
   EXPECT_TRUE(drill.direction.isApprox(Vector3d(0, -1, 0), 1e-12));
@@ -32,11 +25,11 @@ TEST(PlanLocking, AxisAndGuideFollowThePose) {
 
 /// Where the planned view shows a rim of the hole, which lies `along_mm` along the axis from the hole's centre.
 std::vector<Vector2d> rim(const LockingPlan::Drill& drill, double along_mm) {
-  const marrow::Camera camera = implants::camera(drill.alpha_deg, drill.beta_deg);
+  const Camera camera = implants::camera(drill.alpha_deg, drill.beta_deg);
   const Vector3d side = drill.direction.unitOrthogonal(), other = drill.direction.cross(side);
   std::vector<Vector2d> pixels;
   for (int k = 0; k < 36; ++k) {
-    const double angle = marrow::radians(10 * k);
+    const double angle = radians(10 * k);
     pixels.push_back(project(camera, drill.centre_mm + along_mm * drill.direction +
                                          0.5 * drill.diameter_mm * (std::cos(angle) * side + std::sin(angle) * other)));
   }
@@ -69,7 +62,7 @@ TEST(PlanLocking, TheHoleIsACircleInThePlannedView) {
   // Elsewhere the detector is a little oblique to the ray: 1 / cos(7 degrees).
   const auto off = drill_of(pose({0.2, -0.3, 0.5}, {0, 0, 50}, {20, -15, -65}));
   EXPECT_LT(ratio_of(rim(off, 5)), 1.01);
-  const marrow::Camera camera = implants::camera(off.alpha_deg, off.beta_deg);
+  const Camera camera = implants::camera(off.alpha_deg, off.beta_deg);
   const Vector2d front = project(camera, off.centre_mm - 5 * off.direction),
                  back = project(camera, off.centre_mm + 5 * off.direction);
   EXPECT_NEAR((front - back).norm(), 0, 1e-6) << "the axis is seen as a point";
@@ -79,17 +72,17 @@ TEST(PlanLocking, TheCArmTurnsAsLittleAsItCan) {
   // The hole lies from side to side, so the view is lateral, from one of the two sides.
   const auto drill = drill_of(pose({0, 0, 0.1}, {0, 0, 50}, {0, 0, 0}));
   EXPECT_NEAR(drill.alpha_deg, 0, 1e-9);
-  EXPECT_NEAR(std::abs(drill.beta_deg), 90 - marrow::degrees(0.1), 1e-9);
+  EXPECT_NEAR(std::abs(drill.beta_deg), 90 - degrees(0.1), 1e-9);
 }
 
 TEST(PlanLocking, DeviationsComeFromThePosesCovariance) {
-  const auto predicted = [](const marrow::Vector6d& deviations) {
-    marrow::Pose at = pose({0, 0, 0}, {0, 0, 50}, {0, 0, 0});
-    at.covariance = marrow::Matrix6d(deviations.cwiseAbs2().asDiagonal());
+  const auto predicted = [](const Vector6d& deviations) {
+    Pose at = pose({0, 0, 0}, {0, 0, 50}, {0, 0, 0});
+    at.covariance = Matrix6d(deviations.cwiseAbs2().asDiagonal());
     const auto drill = drill_of(at);
     return Vector2d(drill.deviation_deg, drill.deviation_mm);
   };
-  const double turn = marrow::radians(0.2);
+  const double turn = radians(0.2);
   // About the hole's own axis: the hole, 50 mm from the origin, moves across. About the rod: the axis turns.
   EXPECT_TRUE(predicted({turn, 0, 0, 0, 0, 0}).isApprox(Vector2d(0, 50 * turn), 1e-9));
   EXPECT_TRUE(predicted({0, turn, 0, 0, 0, 0}).isApprox(Vector2d(0.2, 0), 1e-9)) << "the hole moves along its axis";
@@ -98,10 +91,10 @@ TEST(PlanLocking, DeviationsComeFromThePosesCovariance) {
 }
 
 TEST(PlanLocking, TheDrillComesFromTheOuterSideOfTheLeg) {
-  const marrow::Pose at = pose({0, 0, 0}, {0, 0, 50}, {0, 0, 0});
+  const Pose at = pose({0, 0, 0}, {0, 0, 50}, {0, 0, 0});
   EXPECT_TRUE(drill_of(at, {{"side", "left"}}).guide_mm.isApprox(Vector3d(100, 0, 0), 1e-9)) << "the patient's left";
   EXPECT_TRUE(drill_of(at, {{"side", "right"}}).guide_mm.isApprox(Vector3d(-100, 0, 0), 1e-9)) << "his right";
-  const auto from_front = drill_of(pose({0, 0, marrow::kPi / 2}, {0, 0, 50}, {0, 0, 0}), {{"side", "right"}});
+  const auto from_front = drill_of(pose({0, 0, kPi / 2}, {0, 0, 50}, {0, 0, 0}), {{"side", "right"}});
   EXPECT_TRUE(from_front.guide_mm.isApprox(Vector3d(0, -100, 0), 1e-9)) << "a hole from front to back";
 }
 
@@ -112,14 +105,14 @@ TEST(PlanLocking, NinetyFivePerCentAreThatForAnyShapeOfTheCovariance) {
     double ratio, quantile;  // of the two deviations; in deviations of the larger one
   };
   for (const Case& one : {Case{0, 1.959963985}, Case{0.2, 1.970407501}, Case{0.5, 2.035858720}, Case{1, 2.447746831}}) {
-    marrow::Pose at = pose({0, 0, 0}, {0, 0, 50}, {0, 0, 0});
-    const double turn = marrow::radians(0.4);
-    marrow::Vector6d deviations;
+    Pose at = pose({0, 0, 0}, {0, 0, 50}, {0, 0, 0});
+    const double turn = radians(0.4);
+    Vector6d deviations;
     deviations << 0, turn * one.ratio, turn, 0, 0, 0;
-    at.covariance = marrow::Matrix6d(deviations.cwiseAbs2().asDiagonal());
+    at.covariance = Matrix6d(deviations.cwiseAbs2().asDiagonal());
     EXPECT_NEAR(drill_of(at).most_deg, 0.4 * one.quantile, 1e-8) << one.ratio;
     deviations << 0, 0, 0, 0, 0.3 * one.ratio, 0.3;
-    at.covariance = marrow::Matrix6d(deviations.cwiseAbs2().asDiagonal());
+    at.covariance = Matrix6d(deviations.cwiseAbs2().asDiagonal());
     EXPECT_NEAR(drill_of(at).most_mm, 0.3 * one.quantile, 1e-8) << one.ratio;
   }
 }
@@ -127,56 +120,54 @@ TEST(PlanLocking, NinetyFivePerCentAreThatForAnyShapeOfTheCovariance) {
 /// 4000 poses drawn from a covariance whose largest part is a turn about the nail: 95 % of the holes' axes turn by at
 /// most the stated angle. (Three deviations of the share are 1.0 %.)
 TEST(PlanLocking, NinetyFivePerCentOfDrawnPosesAreWithin) {
-  marrow::Pose at = pose({0.1, 0.2, 0.3}, {0, 0, 50}, {0, 0, 0});
-  marrow::Vector6d deviations;
-  deviations << marrow::radians(0.05), marrow::radians(0.08), marrow::radians(0.6), 0.1, 0.3, 0.2;
-  at.covariance = marrow::Matrix6d(deviations.cwiseAbs2().asDiagonal());
+  Pose at = pose({0.1, 0.2, 0.3}, {0, 0, 50}, {0, 0, 0});
+  Vector6d deviations;
+  deviations << radians(0.05), radians(0.08), radians(0.6), 0.1, 0.3, 0.2;
+  at.covariance = Matrix6d(deviations.cwiseAbs2().asDiagonal());
   const auto drill = drill_of(at);
-  marrow::Random random(7);
+  Random random(7);
   constexpr int kDraws = 4000;
   int within_deg = 0, within_mm = 0;
   for (int i = 0; i < kDraws; ++i) {
-    marrow::Vector6d motion;
+    Vector6d motion;
     for (int k = 0; k < 6; ++k) motion[k] = deviations[k] * random.normal();
-    const marrow::RigidTransform true_pose = moved(at.world_from_model, at.frame, motion);
+    const RigidTransform true_pose = moved(at.world_from_model, at.frame, motion);
     const Vector3d axis = true_pose.rotation * Vector3d::UnitX(), off = true_pose * Vector3d(0, 0, 50);
-    within_deg += marrow::degrees(std::asin(axis.cross(drill.direction).norm())) < drill.most_deg;
+    within_deg += degrees(std::asin(axis.cross(drill.direction).norm())) < drill.most_deg;
     within_mm += (off - drill.centre_mm).cross(drill.direction).norm() < drill.most_mm;
   }
   EXPECT_NEAR(within_deg / double(kDraws), 0.95, 0.0104);
   EXPECT_NEAR(within_mm / double(kDraws), 0.95, 0.0104);
 }
 
-marrow::Verdict verdict_of(const marrow::Pose& at, const shipped::Options& options = {}) {
-  return implants::locking(rod(), at, options).at("verdict").as<marrow::Verdict>();
+Verdict verdict_of(const Pose& at, const Options& options = {}) {
+  return implants::locking(rod(), at, options).at("verdict").as<Verdict>();
 }
 
 /// A cost that is the same everywhere.
-class Constant : public marrow::Cost {
+class Constant : public Cost {
  public:
   explicit Constant(double value) : value_(value) {}
-  double value(const marrow::RigidTransform&) const override { return value_; }
-  std::shared_ptr<const marrow::Cost> at_level(const marrow::CostLevel&) const override {
-    return std::make_shared<Constant>(value_);
-  }
+  double value(const RigidTransform&) const override { return value_; }
+  std::shared_ptr<const Cost> at_level(const CostLevel&) const override { return std::make_shared<Constant>(value_); }
 
  private:
   double value_;
 };
 
 TEST(PlanLocking, DoubtsAreSaidInWords) {
-  marrow::Pose at = pose({0, 0, 0}, {0, 0, 50}, {0, 0, 0});
-  EXPECT_EQ(verdict_of(at).judgement, marrow::Judgement::trusted);
+  Pose at = pose({0, 0, 0}, {0, 0, 50}, {0, 0, 0});
+  EXPECT_EQ(verdict_of(at).judgement, Judgement::trusted);
   EXPECT_NE(verdict_of(at).reasons.at(0).find("the axes of the holes are known to 0.01 degrees and "),
             std::string::npos);
-  const auto is_doubted = [&](const std::string& reason, const shipped::Options& options = {}) {
-    const marrow::Verdict verdict = verdict_of(at, options);
-    EXPECT_EQ(verdict.judgement, marrow::Judgement::doubtful);
+  const auto is_doubted = [&](const std::string& reason, const Options& options = {}) {
+    const Verdict verdict = verdict_of(at, options);
+    EXPECT_EQ(verdict.judgement, Judgement::doubtful);
     EXPECT_FALSE(verdict.remedies.empty());
     EXPECT_EQ(verdict.reasons.at(0), reason);
   };
   // One direction of a turn or shift: 1.96 deviations.
-  at.covariance->diagonal() << 0, 0, std::pow(marrow::radians(0.57), 2), 0, 0, 0;
+  at.covariance->diagonal() << 0, 0, std::pow(radians(0.57), 2), 0, 0, 0;
   is_doubted("distal: the direction of the hole is known to 1.12 degrees only (95 %), and the limit is 1.00");
   at.covariance->diagonal() << 0, 0, 0, 0, 0.27 * 0.27, 0;
   is_doubted("distal: the place of the hole is known to 0.53 mm only (95 %), and the limit is 0.50");
@@ -188,22 +179,18 @@ TEST(PlanLocking, DoubtsAreSaidInWords) {
   at = pose({0, 0, 0}, {0, 0, 50}, {0, 110, 0});  // out of the lateral view
   is_doubted("distal: only one view shows the hole");
   at = pose({0, 0, 0}, {0, 0, 50}, {0, 0, 0});
-  shipped::Inputs with_cost = inputs(rod(), at);
-  with_cost["cost"] = marrow::Value::of<marrow::Cost>(std::make_shared<const Constant>(0.6));
-  const marrow::Verdict verdict =
-      shipped::call("plan.locking", with_cost, {{"side", "left"}}).at("verdict").as<marrow::Verdict>();
+  Inputs with_cost = inputs(rod(), at);
+  with_cost["cost"] = Value::of<Cost>(std::make_shared<const Constant>(0.6));
+  const Verdict verdict = output<Verdict>("plan.locking", "verdict", with_cost, {{"side", "left"}});
   EXPECT_EQ(verdict.reasons.at(0),
             "the images do not show the holes where this pose has them: the cost there is 0.60, and the limit is 0.35");
-  EXPECT_EQ(shipped::call("plan.locking", with_cost, {{"side", "left"}, {"max_cost", 0.7}})
-                .at("verdict")
-                .as<marrow::Verdict>()
-                .judgement,
-            marrow::Judgement::trusted);
+  EXPECT_EQ(output<Verdict>("plan.locking", "verdict", with_cost, {{"side", "left"}, {"max_cost", 0.7}}).judgement,
+            Judgement::trusted);
 }
 
 TEST(PlanLocking, RefusesWhatCannotBePlanned) {
-  const marrow::Pose at = pose({0, 0, 0}, {0, 0, 50}, {0, 0, 0});
-  const auto refusal = [](const Implant& implant, const marrow::Pose& pose, const shipped::Options& options = {}) {
+  const Pose at = pose({0, 0, 0}, {0, 0, 50}, {0, 0, 0});
+  const auto refusal = [](const Implant& implant, const Pose& pose, const Options& options = {}) {
     return shipped::refusal("plan.locking", inputs(implant, pose), implants::of_left_leg(options));
   };
   Implant without = rod();
@@ -237,34 +224,32 @@ TEST(PlanLocking, RefusesWhatCannotBePlanned) {
   EXPECT_EQ(refusal(rod(), pose({0, 0, 0}, {0, 0, 50}, {0, 0, 300})),
             "plan.locking: no view shows any of the 1 holes of the nail at its pose; take images of the nail's tip, or "
             "check the pose");
-  EXPECT_EQ(refusal(rod(), at, {{"from", std::vector<double>{0, 0, 0}}}),
+  EXPECT_EQ(refusal(rod(), at, {{"from", Numbers{0, 0, 0}}}),
             "plan.locking: from has the length 0; give the direction from which the drill comes, such as [1, 0, 0]");
-  EXPECT_EQ(refusal(rod(), at, {{"from", std::vector<double>{1, 0}}}),
+  EXPECT_EQ(refusal(rod(), at, {{"from", Numbers{1, 0}}}),
             "plan.locking: from takes one direction, as [1, 0, 0], got 2 numbers");
   EXPECT_EQ(shipped::refusal("plan.locking", inputs(rod(), at)),
             "plan.locking: nothing says from which side the drill comes; give 'side' (left or right: of the leg), or "
             "'from', such as [1, 0, 0] for the patient's left");
-  EXPECT_EQ(refusal(rod(), at, {{"isocentre_mm", std::vector<double>{0, 0, 700}}}),
+  EXPECT_EQ(refusal(rod(), at, {{"isocentre_mm", Numbers{0, 0, 700}}}),
             "plan.locking: hole 'distal' lies 700.00 mm from the isocentre, but the C-arm's source is only 600.00 mm "
             "from it; check isocentre_mm and the pose");
 }
 
 TEST(PlanBodies, BonesNailAndARodForEachHole) {
-  const marrow::Pose at = pose({0, 0, 0}, {0, 0, 50}, {0, 0, 0});
+  const Pose at = pose({0, 0, 0}, {0, 0, 50}, {0, 0, 0});
   const auto plan = implants::locking(rod(), at).at("plan");
-  marrow::List<marrow::Mesh> bones;
-  bones.add("femur", rod().surface);
-  bones.add("without a pose", rod().surface);
-  marrow::List<marrow::Pose> poses;
+  List<Pose> poses;
   poses.add("femur", at);
-  const auto bodies = shipped::call("plan.bodies", {{"models", shipped::list(bones, "fragment")},
-                                                    {"poses", shipped::list(poses, "fragment")},
-                                                    {"nail", shipped::item(rod().surface)},
-                                                    {"pose", shipped::item(at)},
-                                                    {"plan", plan}});
-  const auto meshes = bodies.at("models").as_list<marrow::Mesh>();
-  EXPECT_EQ(meshes.names(), (std::vector<std::string>{"femur", "nail", "distal"}));
-  EXPECT_EQ(bodies.at("poses").as_list<marrow::Pose>().names(), meshes.names());
+  const auto bodies =
+      call("plan.bodies", {{"models", per_fragment("femur", rod().surface, "without a pose", rod().surface)},
+                           {"poses", shipped::list(poses, "fragment")},
+                           {"nail", item(rod().surface)},
+                           {"pose", item(at)},
+                           {"plan", plan}});
+  const auto meshes = bodies.at("models").as_list<Mesh>();
+  EXPECT_EQ(meshes.names(), (Strings{"femur", "nail", "distal"}));
+  EXPECT_EQ(bodies.at("poses").as_list<Pose>().names(), meshes.names());
   double most_x = -1e9, least_x = 1e9;
   for (const Vector3d& vertex : meshes[2].vertices_mm) {
     most_x = std::max(most_x, vertex.x());
@@ -275,4 +260,4 @@ TEST(PlanBodies, BonesNailAndARodForEachHole) {
   EXPECT_NEAR(least_x, -30, 1e-9);
 }
 
-}  // namespace locking_test
+}  // namespace marrow::test::locking_test

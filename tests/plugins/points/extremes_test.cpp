@@ -1,13 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <gtest/gtest.h>
-
 #include "marrow/toolbox/analytic/body.hpp"
-#include "shipped.hpp"
+#include "tests/harness/node_test.hpp"
 
-namespace extremes_test {
-
-using namespace marrow;
-using Eigen::Vector3d;
+namespace marrow::test::extremes_test {
 
 /// A shaft along z with two condyles of different size below it, the body's right-hand side at negative x.
 analytic::Body bone() {
@@ -25,25 +20,25 @@ Mesh surface(const RigidTransform& ct_from_bone = {"ct", "ct"}, bool is_mirrored
   return mesh;
 }
 
-using Numbers = std::vector<double>;
-using Names = std::vector<std::string>;
+using Numbers = Numbers;
+using Names = Strings;
 
-shipped::Options options() {
+Options options() {
   return {{"names", Names{"medial", "lateral", "medial_back", "lateral_back"}},
           {"outward", Numbers{-1, 1, -0.8, 0.8}},
           {"back", Numbers{0, 0, 1, 1}},
           {"up", Numbers{0, 0, -0.2, -0.2}}};
 }
 
-std::map<std::string, Vector3d> points_of(const Mesh& mesh, const shipped::Options& with) {
-  const auto made = shipped::call("points.extremes", {{"model", shipped::item(mesh)}}, with);
+std::map<std::string, Vector3d> points_of(const Mesh& mesh, const Options& with) {
+  const auto made = call("points.extremes", {{"model", item(mesh)}}, with);
   std::map<std::string, Vector3d> points;
   for (const auto& point : made.at("points").as<Landmarks>().points) points[point.name] = point.model_mm;
   return points;
 }
 
-shipped::Options with(const std::string& name, const OptionValue& value) {
-  shipped::Options changed = options();
+Options with(const std::string& name, const OptionValue& value) {
+  Options changed = options();
   changed[name] = value;
   return changed;
 }
@@ -76,7 +71,7 @@ TEST(Extremes, AreThoseOfTheOtherSideInAMirror) {
 }
 
 TEST(Extremes, OfALevelMoveWithTheBone) {
-  const shipped::Options level = with("level", Names{"medial_back", "lateral_back"});
+  const Options level = with("level", Names{"medial_back", "lateral_back"});
   const auto plain = points_of(surface(), level);
   RigidTransform turned{"ct", "ct"};
   turned.rotation =
@@ -94,7 +89,7 @@ TEST(Extremes, OfALevelMoveWithTheBone) {
 /// A body that is widest from the right to the left: its long axis is the CT's x.
 TEST(Extremes, OfTheCtsAxesLieInTheCtsDirectionsWhateverTheShape) {
   const Mesh wide = analytic::mesh_of({{{5, 0, 0}, {90, 30, 40}}});
-  shipped::Options top{
+  Options top{
       {"names", Names{"top"}}, {"outward", Numbers{0}}, {"back", Numbers{0}}, {"up", Numbers{1}}, {"cap_mm", 1.0}};
   const Vector3d along_the_body = points_of(wide, top).at("top");
   EXPECT_NEAR(std::abs(along_the_body.x() - 5), 90, 1);
@@ -103,8 +98,8 @@ TEST(Extremes, OfTheCtsAxesLieInTheCtsDirectionsWhateverTheShape) {
 }
 
 TEST(Extremes, AreRefusedWhereTheyAreNotDetermined) {
-  const auto refusal = [&](const shipped::Options& given) {
-    return shipped::refusal("points.extremes", {{"model", shipped::item(surface())}}, given);
+  const auto refusal = [&](const Options& given) {
+    return shipped::refusal("points.extremes", {{"model", item(surface())}}, given);
   };
   EXPECT_EQ(refusal(with("outward", Numbers{0, 1, -0.8, 0.8})),
             "point 'medial': outward, back and up are all 0; give a direction");
@@ -116,8 +111,8 @@ TEST(Extremes, AreRefusedWhereTheyAreNotDetermined) {
   Mesh tetrahedron;
   tetrahedron.vertices_mm = {{0, 0, 0}, {50, 0, 0}, {0, 50, 0}, {0, 0, 90}};
   tetrahedron.triangles = {{0, 2, 1}, {0, 1, 3}, {0, 3, 2}, {1, 2, 3}};
-  EXPECT_EQ(shipped::refusal("points.extremes", {{"model", shipped::item(tetrahedron)}}, options()),
+  EXPECT_EQ(shipped::refusal("points.extremes", {{"model", item(tetrahedron)}}, options()),
             "no triangle of the surface lies within cap_mm, 3 mm, of its extreme; make cap_mm larger");
 }
 
-}  // namespace extremes_test
+}  // namespace marrow::test::extremes_test

@@ -2,27 +2,24 @@
 #include "tests/plugins/project/made.hpp"
 #include "tests/plugins/project/radiograph_behaviour.hpp"
 
-namespace lightfield_test {
+namespace marrow::test::lightfield_test {
 
-using marrow::RadiographProjector;
-using marrow::Volume;
-
-shipped::Inputs inputs(const Volume& volume, const marrow::SignedField* field) {
-  marrow::List<marrow::View> views;
+Inputs inputs(const Volume& volume, const SignedField* field) {
+  List<View> views;
   for (const double angle : {0.0, 90.0})
-    views.add(angle > 0 ? "lateral" : "frontal", marrow::View{"", {}, radiograph_behaviour::camera(angle), {}});
-  shipped::Inputs in{{"volume", shipped::item(volume)}, {"views", shipped::list(views, "view")}};
-  if (field) in["field"] = shipped::item(*field);
+    views.add(angle > 0 ? "lateral" : "frontal", View{"", {}, radiograph_behaviour::camera(angle), {}});
+  Inputs in{{"volume", item(volume)}, {"views", shipped::list(views, "view")}};
+  if (field) in["field"] = item(*field);
   return in;
 }
 
-std::shared_ptr<const RadiographProjector> make_medium(const Volume& volume, const marrow::SignedField* field) {
+std::shared_ptr<const RadiographProjector> make_medium(const Volume& volume, const SignedField* field) {
   return made::projector<RadiographProjector>(
       "project.lightfield", inputs(volume, field),
       {{"ray_spacing_mm", 2.0}, {"direction_spacing_deg", 1.5}, {"max_rotation_deg", 2.0}});
 }
 /// With a coarse table, which is quick to make.
-std::shared_ptr<const RadiographProjector> make_coarse(const Volume& volume, const marrow::SignedField* field) {
+std::shared_ptr<const RadiographProjector> make_coarse(const Volume& volume, const SignedField* field) {
   return made::projector<RadiographProjector>(
       "project.lightfield", inputs(volume, field),
       {{"ray_spacing_mm", 5.0}, {"direction_spacing_deg", 4.0}, {"max_rotation_deg", 2.0}});
@@ -40,12 +37,12 @@ TEST(LightField, HasNoSmoothedModel) {
 }
 
 TEST(LightField, FinerStepsAreMoreAccurate) {
-  const shipped::Inputs in = inputs(radiograph_behaviour::cloud(), nullptr);
-  const marrow::Camera& camera = radiograph_behaviour::camera(0);
-  marrow::RigidTransform pose = shapes::centred_at({3, -4, 6});
-  pose.rotation = marrow::rotation_from_vector({0.05, -0.04, 0.06});
+  const Inputs in = inputs(radiograph_behaviour::cloud(), nullptr);
+  const Camera& camera = radiograph_behaviour::camera(0);
+  RigidTransform pose = shapes::centred_at({3, -4, 6});
+  pose.rotation = rotation_from_vector({0.05, -0.04, 0.06});
   const auto exact = made::projector<RadiographProjector>("project.siddon_jacobs", {{"volume", in.at("volume")}});
-  const marrow::PixelGrid grid{150, 150, 3, 70, 70};
+  const PixelGrid grid{150, 150, 3, 70, 70};
   const auto expected = exact->radiograph(camera, pose, grid);
   const auto error = [&](double step_mm, double step_deg) {
     const auto values =
@@ -65,8 +62,8 @@ TEST(LightField, FinerStepsAreMoreAccurate) {
 
 TEST(LightField, OutOfRangeItIsJosephs) {
   // The table holds no ray for a rotation of 30 degrees.
-  const shipped::Inputs in = inputs(radiograph_behaviour::cloud(), nullptr);
-  const marrow::Camera& camera = radiograph_behaviour::camera(40);
+  const Inputs in = inputs(radiograph_behaviour::cloud(), nullptr);
+  const Camera& camera = radiograph_behaviour::camera(40);
   const std::vector<Eigen::Vector2f> pixels{{250, 250}, {240, 263}, {300, 222}};
   const auto values = made::projector<RadiographProjector>("project.lightfield", in, {{"ray_spacing_mm", 5.0}})
                           ->radiograph(camera, shapes::centred_at({0, 0, 0}), pixels);
@@ -76,17 +73,16 @@ TEST(LightField, OutOfRangeItIsJosephs) {
 }
 
 TEST(LightField, SaysWhatIsWrong) {
-  shipped::Inputs in = inputs(radiograph_behaviour::cloud(), nullptr);
-  const std::string text =
-      shipped::refusal("project.lightfield", in, {{"ray_spacing_mm", 0.2}, {"direction_spacing_deg", 0.3}});
+  Inputs in = inputs(radiograph_behaviour::cloud(), nullptr);
+  const std::string text = refusal("project.lightfield", in, {{"ray_spacing_mm", 0.2}, {"direction_spacing_deg", 0.3}});
   EXPECT_NE(text.find("MB, but max_memory_mb is 1024; raise ray_spacing_mm or direction_spacing_deg, take a smaller "
                       "max_rotation_deg, or the "
                       "field of a fragment"),
             std::string::npos)
       << text;
   in["views"] = {};
-  EXPECT_EQ(shipped::refusal("project.lightfield", in),
+  EXPECT_EQ(refusal("project.lightfield", in),
             "there is no view, so the directions to integrate along are not known; wire 'views'");
 }
 
-}  // namespace lightfield_test
+}  // namespace marrow::test::lightfield_test

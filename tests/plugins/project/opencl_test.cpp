@@ -4,13 +4,12 @@
 #define CL_TARGET_OPENCL_VERSION 120
 #include <CL/cl.h>
 #include <dlfcn.h>
-
 #include <cstring>
 #include <thread>
 
 #include "tests/plugins/project/made.hpp"
 
-namespace opencl_test {
+namespace marrow::test::opencl_test {
 
 enum class Fault { none, no_platform, little_memory, full, no_compiler };
 Fault fault = Fault::none;
@@ -21,7 +20,7 @@ Function* next(const char* name) {
   return reinterpret_cast<Function*>(dlsym(library, name));
 }
 
-}  // namespace opencl_test
+}  // namespace marrow::test::opencl_test
 
 extern "C" {
 
@@ -65,13 +64,9 @@ cl_int clGetProgramBuildInfo(cl_program program, cl_device_id device, cl_program
 
 namespace opencl_test {
 
-using marrow::PixelGrid;
-using marrow::RadiographProjector;
-using marrow::RigidTransform;
-
 /// A block of bone in air.
-marrow::Volume block() {
-  marrow::Volume volume;
+Volume block() {
+  Volume volume;
   volume.grid.size = {20, 22, 24};
   volume.grid.spacing_mm = {1, 1.2, 1.5};
   volume.values.assign(volume.grid.count(), -1000);
@@ -81,8 +76,8 @@ marrow::Volume block() {
   return volume;
 }
 
-marrow::Camera camera() {
-  marrow::Camera camera;
+Camera camera() {
+  Camera camera;
   camera.width_px = camera.height_px = 64;
   camera.intrinsics << 400, 0, 31.5, 0, 400, 31.5, 0, 0, 1;
   camera.camera_from_world.translation_mm = {-10, -12, 300};
@@ -90,18 +85,18 @@ marrow::Camera camera() {
 }
 
 struct Made {
-  shipped::Outputs outputs;
+  Outputs outputs;
   std::string warnings;
   const RadiographProjector& projector() const { return outputs.at("projector").as<RadiographProjector>(); }
 };
 
-Made made(const std::string& node, const marrow::Volume& volume, const shipped::Options& options = {}) {
+Made made(const std::string& node, const Volume& volume, const Options& options = {}) {
   Made result;
-  marrow::Context::Hooks hooks;
-  hooks.log = [&](std::string_view message, marrow::LogLevel level) {
-    if (level == marrow::LogLevel::warning) result.warnings += message;
+  Context::Hooks hooks;
+  hooks.log = [&](std::string_view message, LogLevel level) {
+    if (level == LogLevel::warning) result.warnings += message;
   };
-  result.outputs = shipped::call(node, {{"volume", shipped::item(volume)}}, options, marrow::Context(std::move(hooks)));
+  result.outputs = call(node, {{"volume", item(volume)}}, options, Context(std::move(hooks)));
   return result;
 }
 
@@ -161,7 +156,7 @@ TEST_F(OpenCl, FailsWithASentenceIfMemoryRunsOutLater) {
   try {
     one.projector().radiograph(camera(), {"world", "ct"}, PixelGrid{0, 0, 1, 64, 64});
     ADD_FAILURE() << "no error";
-  } catch (const marrow::Error& error) {
+  } catch (const Error& error) {
     EXPECT_NE(std::string(error.what()).find("the device has too little memory"), std::string::npos) << error.what();
   }
   fault = Fault::none;  // and the projector can still be used
@@ -169,8 +164,7 @@ TEST_F(OpenCl, FailsWithASentenceIfMemoryRunsOutLater) {
 }
 
 TEST_F(OpenCl, ADeviceThatIsNotThereIsRefusedWithThoseThatAre) {
-  const std::string told =
-      shipped::refusal("project.opencl", {{"volume", shipped::item(block())}}, {{"device", std::string("no such")}});
+  const std::string told = refusal("project.opencl", {{"volume", item(block())}}, {{"device", std::string("no such")}});
   EXPECT_TRUE(told.starts_with("no device's name contains 'no such'; there are '")) << told;
 }
 

@@ -1,18 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 // What every projector of outlines must satisfy, with its own tolerance in pixels.
-#include <gtest/gtest.h>
-
-#include <functional>
 #include <marrow/base/error.hpp>
-#include <marrow/domain/functions.hpp>
-#include <marrow/domain/volume.hpp>
-#include <memory>
 
-#include "tests/harness/message_of.hpp"
 #include "tests/plugins/project/made.hpp"
 #include "tests/plugins/project/shapes.hpp"
 
-namespace outlines_test {
+namespace marrow::test::outlines_test {
 
 struct Node {
   const char* name;
@@ -22,7 +15,7 @@ void PrintTo(const Node& node, std::ostream* stream) { *stream << node.name; }
 
 class Outlines : public testing::TestWithParam<Node> {
  protected:
-  static std::shared_ptr<const marrow::OutlineProjector> make(const marrow::Mesh& mesh, const marrow::Volume* volume) {
+  static std::shared_ptr<const OutlineProjector> make(const Mesh& mesh, const Volume* volume) {
     return made::outlines(std::string("project.") + GetParam().name, mesh, volume);
   }
 };
@@ -33,39 +26,38 @@ INSTANTIATE_TEST_SUITE_P(, Outlines, testing::Values(Node{"silhouette", 0.8, 4},
 /// the cone is asin(r / d).
 TEST_P(Outlines, SphereIsItsTangentCone) {
   const auto [name, tolerance_px, model_tolerance_px] = GetParam();
-  const marrow::Mesh mesh = shapes::sphere(30);
+  const Mesh mesh = shapes::sphere(30);
   const auto projector = make(mesh, nullptr);
-  const marrow::Camera camera = shapes::c_arm(0);
-  const Eigen::Vector3d centre(12, -20, 9);
-  marrow::RigidTransform world_from_model = shapes::centred_at({0, 0, 30});
+  const Camera camera = shapes::c_arm(0);
+  const Vector3d centre(12, -20, 9);
+  RigidTransform world_from_model = shapes::centred_at({0, 0, 30});
   world_from_model.translation_mm += centre;
   const auto points = projector->outline(camera, world_from_model, 2);
   ASSERT_GT(points.size(), 100u);
-  const Eigen::Vector3d source = marrow::source_position_mm(camera), sight = centre - source;
+  const Vector3d source = source_position_mm(camera), sight = centre - source;
   const double half_angle = std::asin(30 / sight.norm());
   for (const auto& p : points) {
-    const Eigen::Vector3d ray = marrow::ray_direction(camera, {p.u_px, p.v_px});
+    const Vector3d ray = ray_direction(camera, {p.u_px, p.v_px});
     const double angle = std::acos(ray.dot(sight.normalized()));
     const double focal_px = camera.intrinsics(0, 0);
     EXPECT_NEAR((angle - half_angle) * focal_px, 0, tolerance_px);
-    const Eigen::Vector2d outward = Eigen::Vector2d(p.u_px, p.v_px) - marrow::project(camera, centre);
-    EXPECT_GT(outward.normalized().dot(Eigen::Vector2d(p.normal_u, p.normal_v)), 0.95);
+    const Vector2d outward = Vector2d(p.u_px, p.v_px) - project(camera, centre);
+    EXPECT_GT(outward.normalized().dot(Vector2d(p.normal_u, p.normal_v)), 0.95);
     EXPECT_NEAR(std::hypot(p.normal_u, p.normal_v), 1, 1e-5);
-    EXPECT_LT((marrow::project(camera, world_from_model * p.model_mm.cast<double>()) - Eigen::Vector2d(p.u_px, p.v_px))
-                  .norm(),
+    EXPECT_LT((project(camera, world_from_model * p.model_mm.cast<double>()) - Vector2d(p.u_px, p.v_px)).norm(),
               model_tolerance_px);
   }
-  const double circumference_px = 2 * marrow::kPi * camera.intrinsics(0, 0) * std::tan(half_angle);
+  const double circumference_px = 2 * kPi * camera.intrinsics(0, 0) * std::tan(half_angle);
   EXPECT_GT(double(points.size()), 0.65 * circumference_px / 2);
   EXPECT_LT(double(points.size()), 1.15 * circumference_px / 2);
 }
 
 /// Of two spheres, one behind the other, only the outer outline counts. Side by side, both count.
 TEST_P(Outlines, HiddenPartsAreLeftOut) {
-  marrow::Mesh mesh = shapes::sphere(30);
-  const marrow::Mesh second = shapes::sphere(15);
+  Mesh mesh = shapes::sphere(30);
+  const Mesh second = shapes::sphere(15);
   const auto offset = std::uint32_t(mesh.vertices_mm.size());
-  for (const auto& v : second.vertices_mm) mesh.vertices_mm.push_back(v + Eigen::Vector3d(0, 60, 15));
+  for (const auto& v : second.vertices_mm) mesh.vertices_mm.push_back(v + Vector3d(0, 60, 15));
   for (const auto& t : second.triangles) mesh.triangles.push_back({t[0] + offset, t[1] + offset, t[2] + offset});
   const auto projector = make(mesh, nullptr);
   const auto pose = shapes::centred_at({0, 30, 30});
@@ -80,12 +72,12 @@ TEST_P(Outlines, HiddenPartsAreLeftOut) {
 
 /// A cylinder that runs through both ends of its CT. Its sides count, its two ends do not.
 TEST_P(Outlines, EndsOfTheVolumeAreLeftOut) {
-  const marrow::Mesh mesh = shapes::cylinder(14, 100);
-  marrow::Volume volume;
+  const Mesh mesh = shapes::cylinder(14, 100);
+  Volume volume;
   volume.grid.size = {61, 61, 101};
   volume.grid.origin_mm = {-30, -30, 0};
   const auto pose = shapes::centred_at({0, 0, 50});
-  const marrow::Camera camera = shapes::c_arm(0);
+  const Camera camera = shapes::c_arm(0);
   std::size_t all = 0, level = 0;
   for (const auto& p : make(mesh, &volume)->outline(camera, pose, 1)) {
     ++all;
@@ -99,7 +91,7 @@ TEST_P(Outlines, EndsOfTheVolumeAreLeftOut) {
   for (const auto& p : make(mesh, nullptr)->outline(camera, pose, 1)) level += std::abs(p.normal_v) > 0.9;
   EXPECT_GT(level, 60u);
 
-  const auto refusal = [&] { return marrow::test::message_of([&] { make(mesh, &volume); }); };
+  const auto refusal = [&] { return message_of([&] { make(mesh, &volume); }); };
   volume.grid.origin_mm.x() += 500;
   EXPECT_EQ(refusal(), "only 0 % of the mesh lies in the volume; give those that belong together");
   volume.grid.frame = "mr";
@@ -107,7 +99,7 @@ TEST_P(Outlines, EndsOfTheVolumeAreLeftOut) {
 }
 
 TEST_P(Outlines, KeepsInsideTheImage) {
-  const marrow::Mesh mesh = shapes::cylinder(14, 400);
+  const Mesh mesh = shapes::cylinder(14, 400);
   const auto projector = make(mesh, nullptr);
   const auto points = projector->outline(shapes::c_arm(0), shapes::centred_at({0, 0, 200}), 1);
   EXPECT_GT(points.size(), 900u);
@@ -120,18 +112,17 @@ TEST_P(Outlines, KeepsInsideTheImage) {
 }
 
 TEST_P(Outlines, RefusesNonsense) {
-  EXPECT_EQ(marrow::test::message_of([&] { make(marrow::Mesh{}, nullptr); }),
-            "the mesh to project: the surface has no triangles");
-  const marrow::Mesh mesh = shapes::sphere(10);
-  EXPECT_THROW(make(mesh, nullptr)->outline(shapes::c_arm(0), shapes::centred_at({0, 0, 10}), 0), marrow::Error);
+  EXPECT_EQ(message_of([&] { make(Mesh{}, nullptr); }), "the mesh to project: the surface has no triangles");
+  const Mesh mesh = shapes::sphere(10);
+  EXPECT_THROW(make(mesh, nullptr)->outline(shapes::c_arm(0), shapes::centred_at({0, 0, 10}), 0), Error);
 }
 
-std::shared_ptr<const marrow::OutlineProjector> exact_outline(const marrow::Mesh& mesh) {
+std::shared_ptr<const OutlineProjector> exact_outline(const Mesh& mesh) {
   return made::outlines("project.silhouette_edges", mesh, nullptr);
 }
 
 TEST(SilhouetteEdges, OpenSurfaceGivesItsSidesOnly) {
-  marrow::Mesh mesh = shapes::cylinder(14, 100);
+  Mesh mesh = shapes::cylinder(14, 100);
   mesh.triangles.resize(mesh.triangles.size() - 400);  // both lids gone
   const auto points = exact_outline(mesh)->outline(shapes::c_arm(0), shapes::centred_at({0, 0, 50}), 1);
   EXPECT_GT(points.size(), 400u);
@@ -139,8 +130,8 @@ TEST(SilhouetteEdges, OpenSurfaceGivesItsSidesOnly) {
 }
 
 TEST(SilhouetteEdges, RepeatedVerticesAreWelded) {
-  const marrow::Mesh mesh = shapes::sphere(30);
-  marrow::Mesh soup;
+  const Mesh mesh = shapes::sphere(30);
+  Mesh soup;
   for (const auto& t : mesh.triangles) {
     const auto first = std::uint32_t(soup.vertices_mm.size());
     for (const auto corner : t) soup.vertices_mm.push_back(mesh.vertices_mm[corner]);
@@ -154,7 +145,7 @@ TEST(SilhouetteEdges, RepeatedVerticesAreWelded) {
 }
 
 TEST(SilhouetteEdges, AgreesWithItselfOnAGridTwiceAsCoarse) {
-  const marrow::Mesh mesh = shapes::distal_femur();
+  const Mesh mesh = shapes::distal_femur();
   const auto pose = shapes::centred_at({0, 0, 90});
   const auto projector = exact_outline(mesh);
   const auto fine = projector->outline(shapes::c_arm(90), pose, 1),
@@ -162,4 +153,4 @@ TEST(SilhouetteEdges, AgreesWithItselfOnAGridTwiceAsCoarse) {
   EXPECT_NEAR(double(fine.size()), 2.0 * double(coarse.size()), 0.03 * double(fine.size()));
 }
 
-}  // namespace outlines_test
+}  // namespace marrow::test::outlines_test

@@ -1,35 +1,21 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 // What every projector of radiographs must do, compared with integrals that are known exactly.
-#include <gtest/gtest.h>
-
-#include <Eigen/Geometry>
-#include <cmath>
-#include <functional>
-#include <map>
-
 #include "marrow/plugin.hpp"
-#include "tests/harness/message_of.hpp"
 #include "tests/plugins/project/shapes.hpp"
 
-namespace radiograph_behaviour {
+namespace marrow::test::radiograph_behaviour {
 
-using marrow::Camera;
-using marrow::PixelGrid;
-using marrow::RadiographProjector;
-using marrow::RigidTransform;
-using marrow::Volume;
-using Make = std::function<std::shared_ptr<const RadiographProjector>(const Volume&, const marrow::SignedField*)>;
+using Make = std::function<std::shared_ptr<const RadiographProjector>(const Volume&, const SignedField*)>;
 
 /// A volume in HU, as a function of the position, around the origin of the frame. `turn` rotates its axes.
-inline Volume volume_of(const std::array<int, 3>& size, const Eigen::Vector3d& spacing_mm, const Eigen::Matrix3d& turn,
-                        const std::function<double(const Eigen::Vector3d&)>& hu) {
+inline Volume volume_of(const std::array<int, 3>& size, const Vector3d& spacing_mm, const Matrix3d& turn,
+                        const std::function<double(const Vector3d&)>& hu) {
   Volume volume;
   volume.grid.size = size;
   volume.grid.spacing_mm = spacing_mm;
   volume.grid.direction = turn;
-  volume.grid.origin_mm =
-      -turn * (0.5 * Eigen::Vector3d(size[0] - 1, size[1] - 1, size[2] - 1).cwiseProduct(spacing_mm));
+  volume.grid.origin_mm = -turn * (0.5 * Vector3d(size[0] - 1, size[1] - 1, size[2] - 1).cwiseProduct(spacing_mm));
   for (int z = 0; z < size[2]; ++z)
     for (int y = 0; y < size[1]; ++y)
       for (int x = 0; x < size[0]; ++x)
@@ -40,19 +26,19 @@ inline Volume volume_of(const std::array<int, 3>& size, const Eigen::Vector3d& s
 constexpr double kWidth_mm = 8;
 
 /// A cloud whose attenuation falls off as a Gaussian from twice water's at its middle.
-inline Volume cloud(const Eigen::Matrix3d& turn = Eigen::Matrix3d::Identity()) {
-  return volume_of({90, 99, 78}, {0.8, 0.7, 1.0}, turn, [](const Eigen::Vector3d& p) {
+inline Volume cloud(const Matrix3d& turn = Matrix3d::Identity()) {
+  return volume_of({90, 99, 78}, {0.8, 0.7, 1.0}, turn, [](const Vector3d& p) {
     return -1000 + 2000 * std::exp(-0.5 * p.squaredNorm() / (kWidth_mm * kWidth_mm));
   });
 }
 
-inline double distance_from_ray(const Camera& camera, const Eigen::Vector2d& pixel, const Eigen::Vector3d& point) {
-  return (point - marrow::source_position_mm(camera)).cross(marrow::ray_direction(camera, pixel)).norm();
+inline double distance_from_ray(const Camera& camera, const Vector2d& pixel, const Vector3d& point) {
+  return (point - source_position_mm(camera)).cross(ray_direction(camera, pixel)).norm();
 }
 
 /// The integral of the cloud along a line that passes its middle at this distance.
 inline double integral_mm(double distance) {
-  return 2 * kWidth_mm * std::sqrt(2 * marrow::kPi) * std::exp(-0.5 * distance * distance / (kWidth_mm * kWidth_mm));
+  return 2 * kWidth_mm * std::sqrt(2 * kPi) * std::exp(-0.5 * distance * distance / (kWidth_mm * kWidth_mm));
 }
 
 inline const Camera& camera(double angle_deg) {
@@ -62,12 +48,11 @@ inline const Camera& camera(double angle_deg) {
 
 inline void integrals_of_a_cloud(const Make& make, double mean_limit_mm, double worst_limit_mm) {
   const RigidTransform pose = shapes::centred_at({3, -4, 6});
-  const Eigen::Vector3d centre = pose * Eigen::Vector3d(0, 0, 0);
+  const Vector3d centre = pose * Vector3d(0, 0, 0);
   for (const double angle : {0.0, 30.0, 45.0, 90.0, 200.0})
     for (const bool turned : {false, true}) {
-      const Eigen::Matrix3d turn =
-          turned ? Eigen::AngleAxisd(0.7, Eigen::Vector3d(1, 2, -1).normalized()).toRotationMatrix()
-                 : Eigen::Matrix3d::Identity();
+      const Matrix3d turn =
+          turned ? Eigen::AngleAxisd(0.7, Vector3d(1, 2, -1).normalized()).toRotationMatrix() : Matrix3d::Identity();
       const auto projector = make(cloud(turn), nullptr);
       const PixelGrid grid = projector->region(camera(angle), pose);
       ASSERT_GT(grid.count(), 1000u);
@@ -100,9 +85,9 @@ inline void smoothed_cloud(const Make& make, double limit_mm) {
   for (int row = 0; row < grid.rows; ++row)
     for (int column = 0; column < grid.columns; ++column) {
       const double distance =
-          distance_from_ray(camera(30), grid.pixel(column, row), pose * Eigen::Vector3d(0, 0, 0)) / width_mm;
-      const double expected = 2 * std::pow(kWidth_mm / width_mm, 3) * width_mm * std::sqrt(2 * marrow::kPi) *
-                              std::exp(-0.5 * distance * distance);
+          distance_from_ray(camera(30), grid.pixel(column, row), pose * Vector3d(0, 0, 0)) / width_mm;
+      const double expected =
+          2 * std::pow(kWidth_mm / width_mm, 3) * width_mm * std::sqrt(2 * kPi) * std::exp(-0.5 * distance * distance);
       worst = std::max(worst,
                        std::abs(values[std::size_t(row) * std::size_t(grid.columns) + std::size_t(column)] - expected));
     }
@@ -111,8 +96,7 @@ inline void smoothed_cloud(const Make& make, double limit_mm) {
 
 /// Rays at right angles to an even block: the chord is its thickness.
 inline void chord_of_a_block(const Make& make) {
-  const Volume block =
-      volume_of({40, 30, 50}, {1, 1, 1}, Eigen::Matrix3d::Identity(), [](const Eigen::Vector3d&) { return 500; });
+  const Volume block = volume_of({40, 30, 50}, {1, 1, 1}, Matrix3d::Identity(), [](const Vector3d&) { return 500; });
   const auto projector = make(block, nullptr);
   Camera far = camera(0);
   const double distance = 1e5;  // nearly parallel rays
@@ -161,7 +145,7 @@ inline double largest_difference_mm(const RadiographProjector& projector, double
 /// smooth volume is summed over fewer slices.
 inline void grids_and_pixels_agree(const Make& make, double limit_mm) {
   const auto projector =
-      make(cloud(Eigen::AngleAxisd(0.5, Eigen::Vector3d(0, 1, 1).normalized()).toRotationMatrix()), nullptr);
+      make(cloud(Eigen::AngleAxisd(0.5, Vector3d(0, 1, 1).normalized()).toRotationMatrix()), nullptr);
   const auto smoothed = projector->smoothed(2.5);
   for (const double angle_deg : {15.0, 195.0})
     for (const int step : {1, 3, 5, 11}) {
@@ -172,10 +156,9 @@ inline void grids_and_pixels_agree(const Make& make, double limit_mm) {
 }
 
 inline void a_field_leaves_the_rest_out(const Make& make) {
-  const Volume two = volume_of({80, 30, 30}, {1, 1, 1}, Eigen::Matrix3d::Identity(), [](const Eigen::Vector3d& p) {
-    return std::abs(std::abs(p.x()) - 20) < 10 ? 1000 : -1000;
-  });
-  marrow::SignedField field{two.grid, {}};
+  const Volume two = volume_of({80, 30, 30}, {1, 1, 1}, Matrix3d::Identity(),
+                               [](const Vector3d& p) { return std::abs(std::abs(p.x()) - 20) < 10 ? 1000 : -1000; });
+  SignedField field{two.grid, {}};
   for (int z = 0; z < 30; ++z)
     for (int y = 0; y < 30; ++y)
       for (int x = 0; x < 80; ++x)
@@ -183,11 +166,11 @@ inline void a_field_leaves_the_rest_out(const Make& make) {
             float(two.grid.point_from_index({double(x), 0, 0}).x()));  // the left half is the fragment
   const auto projector = make(two, &field);
   const auto pixels = [](double x) {
-    return std::vector<Eigen::Vector2f>{marrow::project(camera(0), Eigen::Vector3d(x, 0, 0)).cast<float>()};
+    return std::vector<Eigen::Vector2f>{project(camera(0), Vector3d(x, 0, 0)).cast<float>()};
   };
   EXPECT_GT(projector->radiograph(camera(0), shapes::centred_at({0, 0, 0}), pixels(-20)).at(0), 50);
   EXPECT_EQ(projector->radiograph(camera(0), shapes::centred_at({0, 0, 0}), pixels(20)).at(0), 0);
-  const auto refusal = [&] { return marrow::test::message_of([&] { make(two, &field); }); };
+  const auto refusal = [&] { return message_of([&] { make(two, &field); }); };
   field.grid.origin_mm.x() += 500;
   EXPECT_EQ(refusal(),
             "the field is not where the volume is: voxels of the same index are up to 500 mm apart; wire the "
@@ -200,8 +183,7 @@ inline void a_field_leaves_the_rest_out(const Make& make) {
 }
 
 inline void refuses_nonsense(const Make& make) {
-  const Volume air =
-      volume_of({5, 5, 5}, {1, 1, 1}, Eigen::Matrix3d::Identity(), [](const Eigen::Vector3d&) { return -1000; });
+  const Volume air = volume_of({5, 5, 5}, {1, 1, 1}, Matrix3d::Identity(), [](const Vector3d&) { return -1000; });
   EXPECT_EQ(make(air, nullptr)->region(camera(0), shapes::centred_at({0, 0, 0})).count(), 0u);
   EXPECT_EQ(make(air, nullptr)->radiograph(camera(0), shapes::centred_at({0, 0, 0}), PixelGrid{0, 0, 1, 3, 2}),
             std::vector<float>(6, 0.0f));
@@ -210,8 +192,7 @@ inline void refuses_nonsense(const Make& make) {
 
 /// Rays that start within the volume, so that a part of it lies behind the source.
 inline void source_within(const Make& make) {
-  const Volume block =
-      volume_of({100, 100, 100}, {2, 2, 2}, Eigen::Matrix3d::Identity(), [](const Eigen::Vector3d&) { return 0; });
+  const Volume block = volume_of({100, 100, 100}, {2, 2, 2}, Matrix3d::Identity(), [](const Vector3d&) { return 0; });
   Camera view = camera(0);
   view.camera_from_world.rotation.setIdentity();
   view.camera_from_world.translation_mm.setZero();  // the source at the middle
@@ -221,4 +202,4 @@ inline void source_within(const Make& make) {
   EXPECT_NEAR(values.at(0), 100, 1.1);
 }
 
-}  // namespace radiograph_behaviour
+}  // namespace marrow::test::radiograph_behaviour

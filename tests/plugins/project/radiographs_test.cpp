@@ -3,7 +3,7 @@
 #include "tests/plugins/project/made.hpp"
 #include "tests/plugins/project/radiograph_behaviour.hpp"
 
-namespace radiographs_test {
+namespace marrow::test::radiographs_test {
 
 /// A node, and how far its radiographs may be off.
 struct Node {
@@ -14,7 +14,7 @@ void PrintTo(const Node& node, std::ostream* stream) { *stream << node.name; }
 
 class Radiographs : public testing::TestWithParam<Node> {
  protected:
-  const radiograph_behaviour::Make make = [](const marrow::Volume& volume, const marrow::SignedField* field) {
+  const radiograph_behaviour::Make make = [](const Volume& volume, const SignedField* field) {
     return made::radiographs(std::string("project.") + GetParam().name, volume, field);
   };
 };
@@ -35,4 +35,4 @@ TEST_P(Radiographs, AFieldLeavesTheRestOut) { radiograph_behaviour::a_field_leav
 TEST_P(Radiographs, SourceWithin) { radiograph_behaviour::source_within(make); }
 TEST_P(Radiographs, RefusesNonsense) { radiograph_behaviour::refuses_nonsense(make); }
 
-}  // namespace radiographs_test
+}  // namespace marrow::test::radiographs_test

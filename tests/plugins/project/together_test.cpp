@@ -1,16 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // project.together: line integrals of several bones add.
-#include <gtest/gtest.h>
-
-#include <marrow/domain/functions.hpp>
-#include <memory>
-
 #include "marrow/toolbox/analytic/body.hpp"
-#include "shipped.hpp"
+#include "tests/harness/node_test.hpp"
 
-namespace together_test {
+namespace marrow::test::together_test {
 
-using namespace marrow;
 using analytic::Body, analytic::BodyProjector, analytic::c_arm;
 
 const Body kFirst{{{0, 0, 0}, {9, 12, 20}}}, kSecond{{{0, 0, 0}, {7, 7, 15}}};
@@ -21,7 +15,7 @@ PixelGrid whole() { return {0, 0, 1, 160, 160}; }
 struct Pair {
   std::shared_ptr<const RadiographProjector> first = std::make_shared<const BodyProjector>(kFirst),
                                              second = std::make_shared<const BodyProjector>(kSecond);
-  shipped::Inputs inputs(bool with_pose_of_second = true) const {
+  Inputs inputs(bool with_pose_of_second = true) const {
     List<RadiographProjector> projectors;
     projectors.add_shared("first", first);
     projectors.add_shared("second", second);
@@ -46,7 +40,7 @@ std::vector<float> sum_of(const Pair& pair, const RigidTransform& first, const P
 
 TEST(Together, LineIntegralsAddWhereverTheBoneIs) {
   const Pair pair;
-  const Value made = shipped::call("project.together", pair.inputs()).at("projector");
+  const Value made = call("project.together", pair.inputs()).at("projector");
   const auto& both = made.as<RadiographProjector>();
   for (const double x_mm : {-10.0, 0.0, 14.0})
     // Whole images, every third pixel, and a grid that is not aligned with the pixels that are kept.
@@ -61,7 +55,7 @@ TEST(Together, LineIntegralsAddWhereverTheBoneIs) {
 
 TEST(Together, TheRegionHoldsAllBones) {
   const Pair pair;
-  const Value made = shipped::call("project.together", pair.inputs()).at("projector");
+  const Value made = call("project.together", pair.inputs()).at("projector");
   const auto& both = made.as<RadiographProjector>();
   const PixelGrid region = both.region(camera(), at(-15));
   const std::vector<float> values = both.radiograph(camera(), at(-15), whole());
@@ -79,16 +73,16 @@ TEST(Together, TheRegionHoldsAllBones) {
 
 TEST(Together, NothingIsDrawnWhereTheBoneItselfIsOutOfView) {
   const Pair pair;
-  const Value made = shipped::call("project.together", pair.inputs()).at("projector");
+  const Value made = call("project.together", pair.inputs()).at("projector");
   const auto& both = made.as<RadiographProjector>();
   EXPECT_EQ(both.region(camera(), at(500)).count(), 0u);
   for (const float value : both.radiograph(camera(), at(500), whole())) ASSERT_EQ(value, 0);
 }
 
 TEST(Together, RefusesABoneWithoutAPose) {
-  EXPECT_EQ(shipped::refusal("project.together", Pair().inputs(false)),
+  EXPECT_EQ(refusal("project.together", Pair().inputs(false)),
             "other_projectors has the fragment 'second', but others has no pose of it; give the poses of the same "
             "fragments");
 }
 
-}  // namespace together_test
+}  // namespace marrow::test::together_test

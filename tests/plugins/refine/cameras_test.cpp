@@ -1,47 +1,45 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <gtest/gtest.h>
-
 #include "split.hpp"
 
-namespace refine_cameras_test {
+namespace marrow::test::refine_cameras_test {
 
 TEST(RefineCameras, FindsHowTheCamerasAreOffAgainstEachOther) {
   const RigidTransform frontal = motion({0.3, -0.2, 0.4}, {0.8, 0.5, -3}),
                        lateral = motion({-0.4, 0.3, 0.1}, {2, -0.7, 0.6});
-  const auto outputs = shipped::call("refine.cameras", inputs({Bone({frontal, lateral})}));
+  const auto outputs = call("refine.cameras", inputs({Bone({frontal, lateral})}));
   const RigidTransform wanted = inverse(frontal) * lateral, is = inverse(found(outputs, 0)) * found(outputs, 1);
-  EXPECT_LT(marrow::degrees(marrow::geodesic_angle_rad(wanted.rotation, is.rotation)), 0.02);
-  EXPECT_LT((wanted.translation_mm - is.translation_mm).norm(), 0.1);
+  EXPECT_LT(turn_between_deg(wanted, is), 0.02);
+  EXPECT_LT(shift_between_mm(wanted, is), 0.1);
 }
 
 TEST(RefineCameras, ACostOfViewsGivesTheSame) {
   Bone bone({motion({0.3, -0.2, 0.4}, {0.8, 0.5, -3}), motion({-0.4, 0.3, 0.1}, {2, -0.7, 0.6})});
-  const marrow::Pose wanted = shipped::call("refine.cameras", inputs({bone})).at("poses").as_list<marrow::Pose>()[0];
+  const Pose wanted = output_list<Pose>("refine.cameras", "poses", inputs({bone}))[0];
   bone.cost = std::make_shared<SplitInViews>(bone.cost);
-  const marrow::Pose pose = shipped::call("refine.cameras", inputs({bone})).at("poses").as_list<marrow::Pose>()[0];
-  EXPECT_LT((pose.world_from_model.translation_mm - wanted.world_from_model.translation_mm).norm(), 1e-6);
-  EXPECT_LT(marrow::geodesic_angle_rad(pose.world_from_model.rotation, wanted.world_from_model.rotation), 1e-8);
+  const Pose pose = output_list<Pose>("refine.cameras", "poses", inputs({bone}))[0];
+  EXPECT_LT(shift_between_mm(pose.world_from_model, wanted.world_from_model), 1e-6);
+  EXPECT_LT(geodesic_angle_rad(pose.world_from_model.rotation, wanted.world_from_model.rotation), 1e-8);
   EXPECT_LT((*pose.covariance - *wanted.covariance).norm(), 1e-6 * wanted.covariance->norm());
 }
 
 TEST(RefineCameras, ACostWithDerivativesGivesTheSame) {
   Bone bone({motion({0.3, -0.2, 0.4}, {0.8, 0.5, -3}), motion({-0.4, 0.3, 0.1}, {2, -0.7, 0.6})});
-  const marrow::Pose wanted = shipped::call("refine.cameras", inputs({bone})).at("poses").as_list<marrow::Pose>()[0];
+  const Pose wanted = output_list<Pose>("refine.cameras", "poses", inputs({bone}))[0];
   bone.cost = std::make_shared<SplitWithDerivatives>(bone.cost);
-  const marrow::Pose pose = shipped::call("refine.cameras", inputs({bone})).at("poses").as_list<marrow::Pose>()[0];
-  EXPECT_LT((pose.world_from_model.translation_mm - wanted.world_from_model.translation_mm).norm(), 0.02);
-  EXPECT_LT(marrow::geodesic_angle_rad(pose.world_from_model.rotation, wanted.world_from_model.rotation), 2e-4);
+  const Pose pose = output_list<Pose>("refine.cameras", "poses", inputs({bone}))[0];
+  EXPECT_LT(shift_between_mm(pose.world_from_model, wanted.world_from_model), 0.02);
+  EXPECT_LT(geodesic_angle_rad(pose.world_from_model.rotation, wanted.world_from_model.rotation), 2e-4);
   EXPECT_LT((*pose.covariance - *wanted.covariance).norm(), 0.05 * wanted.covariance->norm());
 }
 
 TEST(RefineCameras, HalfOfAnErrorGoesToEachOfTwoViews) {
   // v of both images is y of the world, so nothing tells which of the two cameras is too high by 2 mm.
   const auto outputs =
-      shipped::call("refine.cameras", inputs({Bone({motion({0, 0, 0}, {0, 0, 0}), motion({0, 0, 0}, {0, 2, 0})})}));
+      call("refine.cameras", inputs({Bone({motion({0, 0, 0}, {0, 0, 0}), motion({0, 0, 0}, {0, 2, 0})})}));
   EXPECT_NEAR(figure(motions(outputs, 0), "shift_v_mm"), -1, 0.02);
   EXPECT_NEAR(figure(motions(outputs, 1), "shift_v_mm"), 1, 0.02);
   EXPECT_NEAR(figure(motions(outputs, 0), "shift_u_mm"), 0, 0.02);
-  const marrow::Pose pose = outputs.at("poses").as_list<marrow::Pose>()[0];
+  const Pose pose = outputs.at("poses").as_list<Pose>()[0];
   EXPECT_NEAR(pose.world_from_model.translation_mm.y(), 41, 0.02);
   // What the images do not show, as in shared_motion_test.cpp: 0.2089 of 0.3125 degrees are left.
   EXPECT_NEAR(figure(motions(outputs, 0), "predicted_rotation_u_deg"), 0.2089, 0.005);
@@ -54,14 +52,13 @@ TEST(RefineCameras, TheReferenceStaysAndTheOthersGoByIt) {
   std::vector<Bone> bones{Bone({none, off}, 1e6)};
   const RigidTransform right = bones[0].pose.world_from_model;
   bones[0].pose = well::pose_at(bones[0].pose, 0.2, 0.1, -0.1, 0.3, 0.5, -0.3);
-  const auto outputs = shipped::call("refine.cameras", inputs(bones), {{"reference_view", std::string("frontal")}});
+  const auto outputs = call("refine.cameras", inputs(bones), {{"reference_view", std::string("frontal")}});
   const auto is_near = [](const RigidTransform& is, const RigidTransform& wanted) {
-    return marrow::degrees(marrow::geodesic_angle_rad(wanted.rotation, is.rotation)) < 0.01 &&
-           (wanted.translation_mm - is.translation_mm).norm() < 0.05;
+    return turn_between_deg(wanted, is) < 0.01 && shift_between_mm(wanted, is) < 0.05;
   };
   EXPECT_TRUE(is_near(found(outputs, 0), none));
   EXPECT_TRUE(is_near(found(outputs, 1), off)) << "the whole error goes to the other camera";
-  const marrow::Pose pose = outputs.at("poses").as_list<marrow::Pose>()[0];
+  const Pose pose = outputs.at("poses").as_list<Pose>()[0];
   EXPECT_LT(well::way(right, pose.world_from_model, pose.frame).norm(), 0.02);
   EXPECT_LT(std::sqrt(pose.covariance->diagonal().maxCoeff()), 0.075)
       << "the cameras add nothing but what the outline may be off: 0.2 px, which are 0.07 mm at the bone";
@@ -69,21 +66,19 @@ TEST(RefineCameras, TheReferenceStaysAndTheOthersGoByIt) {
 
 /// A thin shaft: a shift along a view's depth changes its cost a thousand times less than one across. Each view likes
 /// one pose best, with the noise of Split.
-class Shaft : public marrow::Cost {
+class Shaft : public Cost {
  public:
-  Shaft(std::vector<RigidTransform> best, marrow::FragmentFrame frame) : best_(std::move(best)), frame_(frame) {}
+  Shaft(std::vector<RigidTransform> best, FragmentFrame frame) : best_(std::move(best)), frame_(frame) {}
   double value(const RigidTransform& pose) const override {
     return 0.5 * (value_in_view(0, pose) + value_in_view(1, pose));
   }
-  std::shared_ptr<const marrow::Cost> at_level(const marrow::CostLevel&) const override {
-    return std::make_shared<Shaft>(*this);
-  }
+  std::shared_ptr<const Cost> at_level(const CostLevel&) const override { return std::make_shared<Shaft>(*this); }
   std::size_t view_count() const override { return 2; }
   double value_in_view(std::size_t view, const RigidTransform& pose) const override {
     return 0.5 * off(view, pose).squaredNorm();
   }
-  std::vector<double> without_each_block(const RigidTransform& pose) const override {
-    std::vector<double> values;
+  Numbers without_each_block(const RigidTransform& pose) const override {
+    Numbers values;
     for (std::size_t v = 0; v < 2; ++v)
       for (int block = 0; block < 64; ++block)
         values.push_back(value(pose) + (block < 6 ? 0.5e-3 * off(v, pose)[block] : 0));
@@ -94,13 +89,12 @@ class Shaft : public marrow::Cost {
   /// How far a pose is off, in degrees and mm along the view's u, v and depth, the depth 30 times less.
   Vector6d off(std::size_t view, const RigidTransform& pose) const {
     Vector6d way = well::way(best_[view], pose, frame_);
-    const Eigen::Matrix3d to_camera =
-        views()[view].camera.camera_from_world.rotation * best_[view].rotation * frame_.axes;
+    const Matrix3d to_camera = views()[view].camera.camera_from_world.rotation * best_[view].rotation * frame_.axes;
     way.tail<3>() = (to_camera * way.tail<3>()).cwiseProduct(Vector3d(1, 1, 1 / 30.0));
     return way;
   }
   std::vector<RigidTransform> best_;
-  marrow::FragmentFrame frame_;
+  FragmentFrame frame_;
 };
 
 // A shaft looks 2 mm too far away in the reference, because its outline is 0.2 px too narrow there. The other camera is
@@ -110,10 +104,10 @@ TEST(RefineCameras, HowLargeABoneLooksInTheReferenceMovesNoOtherCamera) {
   Bone bone({none, none});
   const RigidTransform right = bone.pose.world_from_model;
   bone.cost = std::make_shared<Shaft>(std::vector{deeper * right, right}, bone.pose.frame);
-  const auto outputs = shipped::call("refine.cameras", inputs({bone}), {{"reference_view", std::string("frontal")}});
+  const auto outputs = call("refine.cameras", inputs({bone}), {{"reference_view", std::string("frontal")}});
   EXPECT_LT((found(outputs, 0).translation_mm - none.translation_mm).norm(), 1e-9) << "the reference stays";
   EXPECT_LT((found(outputs, 1).translation_mm - none.translation_mm).norm(), 0.6);
-  const marrow::Pose pose = outputs.at("poses").as_list<marrow::Pose>()[0];
+  const Pose pose = outputs.at("poses").as_list<Pose>()[0];
   EXPECT_LT(well::way(right, pose.world_from_model, pose.frame).norm(), 0.6);
   EXPECT_GT(std::sqrt(pose.covariance->bottomRightCorner<3, 3>().trace()), 0.3) << "and the pose is that uncertain";
 }
@@ -123,8 +117,8 @@ TEST(RefineCameras, CamerasThatAreRightStay) {
   std::vector<Bone> bones{Bone({none, none})};
   const RigidTransform right = bones[0].pose.world_from_model;
   bones[0].pose = well::pose_at(bones[0].pose, 0.5, -0.3, 0.2, 0.4, 0.1, -0.6);
-  const auto outputs = shipped::call("refine.cameras", inputs(bones));
-  const marrow::Pose pose = outputs.at("poses").as_list<marrow::Pose>()[0];
+  const auto outputs = call("refine.cameras", inputs(bones));
+  const Pose pose = outputs.at("poses").as_list<Pose>()[0];
   EXPECT_LT(well::way(right, pose.world_from_model, pose.frame).norm(), 0.01);
   for (std::size_t v = 0; v < 2; ++v) {
     EXPECT_LT((found(outputs, v).translation_mm - none.translation_mm).norm(), 0.01);
@@ -139,8 +133,8 @@ TEST(RefineCameras, WhereImagesHardlyTellHowFarTheCamerasAreOffTheDeviationsSayS
   const RigidTransform none = motion({0, 0, 0}, {0, 0, 0});
   const auto deviation_mm = [&](double information) {
     // Relative to a camera that is right, so that no shared error is left.
-    const auto outputs = shipped::call("refine.cameras", inputs({Bone({none, none}, information)}),
-                                       {{"reference_view", std::string("lateral")}});
+    const auto outputs =
+        call("refine.cameras", inputs({Bone({none, none}, information)}), {{"reference_view", std::string("lateral")}});
     return figure(motions(outputs, 0), "predicted_shift_u_mm");
   };
   const double expected_mm = std::sqrt(1 / 3.0 + 25 / 2.0 * std::pow(600 / 1700.0, 2));
@@ -153,20 +147,18 @@ TEST(RefineCameras, WhereImagesHardlyTellHowFarTheCamerasAreOffTheDeviationsSayS
 
 TEST(RefineCameras, SaysWhatTheImagesDoNotDetermine) {
   const RigidTransform none = motion({0, 0, 0}, {0, 0, 0});
-  std::vector<std::string> said;
-  marrow::Context::Hooks hooks;
-  hooks.log = [&](std::string_view text, marrow::LogLevel) { said.emplace_back(text); };
+  Heard heard;
   const auto is_said = [&] {
-    return std::any_of(said.begin(), said.end(), [](const std::string& line) {
+    return std::any_of(heard.lines.begin(), heard.lines.end(), [](const std::string& line) {
       return line.starts_with("view 'frontal': the images do not determine its camera's rotation about u (") &&
              line.ends_with("; what is expected of them counts in the poses' deviations");
     });
   };
-  shipped::call("refine.cameras", inputs({Bone({none, none}, 1e-4)}), {}, marrow::Context(hooks));
+  call("refine.cameras", inputs({Bone({none, none}, 1e-4)}), {}, heard.context);
   EXPECT_TRUE(is_said());
-  said.clear();
-  const auto outputs = shipped::call("refine.cameras", inputs({Bone({none, none}, 1e6)}),
-                                     {{"reference_view", std::string("lateral")}}, marrow::Context(hooks));
+  heard.lines.clear();
+  const auto outputs = call("refine.cameras", inputs({Bone({none, none}, 1e6)}),
+                            {{"reference_view", std::string("lateral")}}, heard.context);
   EXPECT_FALSE(is_said());
   for (const char* name : {"determined_rotation_u", "determined_shift_v", "determined_shift_depth"})
     EXPECT_GT(figure(motions(outputs, 0), name), 99) << name;
@@ -175,20 +167,19 @@ TEST(RefineCameras, SaysWhatTheImagesDoNotDetermine) {
 TEST(RefineCameras, TwoBonesShareTheCameras) {
   const RigidTransform frontal = motion({0.4, 0, -0.3}, {1, 1, 0}), lateral = motion({0, 0.5, 0}, {0, -1.5, 1});
   const std::vector<Bone> bones{Bone({frontal, lateral}), Bone({frontal, lateral}, 1e4, -60)};
-  const auto poses = shipped::call("refine.cameras", inputs(bones)).at("poses").as_list<marrow::Pose>();
+  const auto poses = output_list<Pose>("refine.cameras", "poses", inputs(bones));
   const RigidTransform wanted = inverse(bones[0].pose.world_from_model) * bones[1].pose.world_from_model,
                        is = inverse(poses[0].world_from_model) * poses[1].world_from_model;
-  EXPECT_LT(marrow::degrees(marrow::geodesic_angle_rad(wanted.rotation, is.rotation)), 0.02);
-  EXPECT_LT((wanted.translation_mm - is.translation_mm).norm(), 0.03) << "the reduction does not feel the cameras";
+  EXPECT_LT(turn_between_deg(wanted, is), 0.02);
+  EXPECT_LT(shift_between_mm(wanted, is), 0.03) << "the reduction does not feel the cameras";
 }
 
 TEST(RefineCameras, WhatBothBonesAreOffByInCommonDoesNotCountBetweenThem) {
   // v of both images is y of the world, so nothing tells how high both bones and cameras are together.
   const RigidTransform none = motion({0, 0, 0}, {0, 0, 0}), high = motion({0, 0, 0}, {0, 2, 0});
-  const auto outputs = shipped::call("refine.cameras", inputs({Bone({none, high}, 1e6), Bone({none, high}, 1e6, -60)}));
-  const auto poses = outputs.at("poses").as_list<marrow::Pose>(),
-             relative = outputs.at("relative").as_list<marrow::Pose>();
-  const auto along_y = [](const marrow::Pose& pose) {
+  const auto outputs = call("refine.cameras", inputs({Bone({none, high}, 1e6), Bone({none, high}, 1e6, -60)}));
+  const auto poses = outputs.at("poses").as_list<Pose>(), relative = outputs.at("relative").as_list<Pose>();
+  const auto along_y = [](const Pose& pose) {
     const Vector3d y = (pose.world_from_model.rotation * pose.frame.axes).transpose() * Vector3d::UnitY();
     return std::sqrt(y.dot(pose.covariance->bottomRightCorner<3, 3>() * y));
   };
@@ -205,7 +196,7 @@ class Levels : public Split {
       : Split(std::vector(2, motion({0, 0, 0}, {0, away_mm, 0}) * best), bone.pose.frame, 1e4),
         bone_(bone),
         best_(best) {}
-  std::shared_ptr<const marrow::Cost> at_level(const marrow::CostLevel& level) const override {
+  std::shared_ptr<const Cost> at_level(const CostLevel& level) const override {
     return std::make_shared<Levels>(bone_, best_, level.pixel_step > 1 ? 0.6 : 0);
   }
 
@@ -218,49 +209,44 @@ TEST(RefineCameras, TheLastPixelStepDecidesThePoses) {
   const Bone bone({});
   Bone levels = bone;
   levels.cost = std::make_shared<Levels>(bone, bone.pose.world_from_model, 0);
-  const auto off_mm = [&](std::vector<double> steps) {
-    const auto poses =
-        shipped::call("refine.cameras", inputs({levels}), {{"pixel_step", steps}}).at("poses").as_list<marrow::Pose>();
-    return (poses[0].world_from_model.translation_mm - bone.pose.world_from_model.translation_mm).norm();
+  const auto off_mm = [&](Numbers steps) {
+    const auto poses = output_list<Pose>("refine.cameras", "poses", inputs({levels}), {{"pixel_step", steps}});
+    return shift_between_mm(poses[0].world_from_model, bone.pose.world_from_model);
   };
   EXPECT_NEAR(off_mm({3}), 0.6, 0.02);
   EXPECT_NEAR(off_mm({3, 1}), 0, 0.02);
-  EXPECT_EQ(shipped::refusal("refine.cameras", inputs({bone}), {{"pixel_step", std::vector<double>{}}}),
+  EXPECT_EQ(refusal("refine.cameras", inputs({bone}), {{"pixel_step", Numbers{}}}),
             "pixel_step: there is no level; give a number for one at least");
 }
 
 TEST(RefineCameras, TheViewsKeepTheirImagesAndNames) {
   const RigidTransform none = motion({0, 0, 0}, {0, 0, 0});
-  const auto after = shipped::call("refine.cameras", inputs({Bone({none, none})})).at("views").as_list<marrow::View>();
-  EXPECT_EQ(after.names(), (std::vector<std::string>{"frontal", "lateral"}));
+  const auto after = output_list<View>("refine.cameras", "views", inputs({Bone({none, none})}));
+  EXPECT_EQ(after.names(), (Strings{"frontal", "lateral"}));
   EXPECT_EQ(after[0].camera.intrinsics, views()[0].camera.intrinsics);
   EXPECT_EQ(cv::countNonZero(after[1].image.pixels != views()[1].image.pixels), 0);
 }
 
 TEST(RefineCameras, WarnsOfCamerasThatAreFarOff) {
-  std::vector<std::string> warnings;
-  marrow::Context::Hooks hooks;
-  hooks.log = [&](std::string_view text, marrow::LogLevel level) {
-    if (level == marrow::LogLevel::warning) warnings.emplace_back(text);
-  };
-  shipped::call("refine.cameras", inputs({Bone({motion({0, 0, 0}, {0, 0, 0}), motion({3, 3, 3}, {0, 9, 0})})}), {},
-                marrow::Context(hooks));
-  ASSERT_EQ(warnings.size(), 2u);
-  EXPECT_EQ(warnings[0].find("view 'frontal': its camera is off by "), 0u) << warnings[0];
-  EXPECT_NE(
-      warnings[0].find(" times what the options expect; is it the camera of this image, and are the poses right?"),
-      std::string::npos)
-      << warnings[0];
-  warnings.clear();
-  shipped::call("refine.cameras", inputs({Bone({motion({0, 0, 0}, {0, 0, 0}), motion({0, 0, 0}, {0, 1, 0})})}),
-                {{"max_iterations", std::int64_t(1)}}, marrow::Context(hooks));
-  EXPECT_EQ(warnings, std::vector<std::string>{"the cameras still moved after 1 iterations; raise max_iterations"});
+  Heard heard;
+  call("refine.cameras", inputs({Bone({motion({0, 0, 0}, {0, 0, 0}), motion({3, 3, 3}, {0, 9, 0})})}), {},
+       heard.context);
+  ASSERT_EQ(heard.warnings.size(), 2u);
+  EXPECT_EQ(heard.warnings[0].find("view 'frontal': its camera is off by "), 0u) << heard.warnings[0];
+  EXPECT_NE(heard.warnings[0].find(
+                " times what the options expect; is it the camera of this image, and are the poses right?"),
+            std::string::npos)
+      << heard.warnings[0];
+  heard.warnings.clear();
+  call("refine.cameras", inputs({Bone({motion({0, 0, 0}, {0, 0, 0}), motion({0, 0, 0}, {0, 1, 0})})}),
+       {{"max_iterations", std::int64_t(1)}}, heard.context);
+  EXPECT_EQ(heard.warnings, Strings{"the cameras still moved after 1 iterations; raise max_iterations"});
 }
 
 TEST(RefineCameras, ACostOfViewsNeedsItsBlocks) {
   Bone blind({motion({0, 0, 0}, {0, 0, 0}), motion({0, 0, 0}, {0, 0, 0})}, 0);
   blind.cost = std::make_shared<SplitInViews>(blind.cost);
-  EXPECT_EQ(shipped::refusal("refine.cameras", inputs({blind})),
+  EXPECT_EQ(refusal("refine.cameras", inputs({blind})),
             "the cost gives no values without each block of the images; use a cost that predicts deviations, such as "
             "that of the contour");
 }
@@ -268,37 +254,37 @@ TEST(RefineCameras, ACostOfViewsNeedsItsBlocks) {
 TEST(RefineCameras, SaysWhatIsWrong) {
   const RigidTransform none = motion({0, 0, 0}, {0, 0, 0});
   const Bone bone({none, none});
-  EXPECT_EQ(shipped::refusal("refine.cameras", inputs({Bone({none})}, views(1))),
+  EXPECT_EQ(refusal("refine.cameras", inputs({Bone({none})}, views(1))),
             "there is one view only; a camera is corrected by comparing it with others, so give two views or more");
-  EXPECT_EQ(shipped::refusal("refine.cameras", inputs({})), "there is no bone; wire the pose of at least one");
-  EXPECT_EQ(shipped::refusal("refine.cameras", inputs({Bone({none, none, none})})),
+  EXPECT_EQ(refusal("refine.cameras", inputs({})), "there is no bone; wire the pose of at least one");
+  EXPECT_EQ(refusal("refine.cameras", inputs({Bone({none, none, none})})),
             "the cost of 'distal' compares 3 views, but there are 2; make it of the same views");
-  EXPECT_EQ(shipped::refusal("refine.cameras", inputs({Bone({none, none}, 0)})),
+  EXPECT_EQ(refusal("refine.cameras", inputs({Bone({none, none}, 0)})),
             "the cost gives no values without each block of the images; use a cost that predicts deviations, such as "
             "that of the contour");
-  EXPECT_EQ(shipped::refusal("refine.cameras", inputs({Bone({motion({0, 0, 0}, {0, 0, 0}), none}, 1e4, 40)},
-                                                      [] {
-                                                        marrow::List<marrow::View> behind;
-                                                        for (marrow::View view : views()) {
-                                                          view.camera.camera_from_world.translation_mm.z() = -600;
-                                                          behind.add(view.name, view);
-                                                        }
-                                                        return behind;
-                                                      }())),
+  EXPECT_EQ(refusal("refine.cameras", inputs({Bone({motion({0, 0, 0}, {0, 0, 0}), none}, 1e4, 40)},
+                                             [] {
+                                               List<View> behind;
+                                               for (View view : views()) {
+                                                 view.camera.camera_from_world.translation_mm.z() = -600;
+                                                 behind.add(view.name, view);
+                                               }
+                                               return behind;
+                                             }())),
             "view 'frontal': the bones do not lie in front of its camera; look at the overlays first");
-  EXPECT_EQ(shipped::refusal("refine.cameras", inputs({Bone({})})),
+  EXPECT_EQ(refusal("refine.cameras", inputs({Bone({})})),
             "the cost of 'distal' cannot be split into views: it compares no views, or it holds more than them, such "
             "as a prior; give the cost of the images alone");
-  EXPECT_EQ(shipped::refusal("refine.cameras", inputs({bone}), {{"reference_view", std::string("frontl")}}),
+  EXPECT_EQ(refusal("refine.cameras", inputs({bone}), {{"reference_view", std::string("frontl")}}),
             "reference_view: there is no view 'frontl'; did you mean 'frontal'?");
   Bone negative = bone;
-  negative.pose.covariance = marrow::Matrix6d(-marrow::Matrix6d::Identity());
-  EXPECT_EQ(shipped::refusal("refine.cameras", inputs({negative})),
+  negative.pose.covariance = Matrix6d(-Matrix6d::Identity());
+  EXPECT_EQ(refusal("refine.cameras", inputs({negative})),
             "the pose of 'distal': the covariance has the negative variance -1 in row 1, column 1; a covariance is "
             "symmetric and has no negative eigenvalue");
   auto other = inputs({bone});
   other["poses"] = inputs({bone, bone})["poses"];
-  EXPECT_EQ(shipped::refusal("refine.cameras", other),
+  EXPECT_EQ(refusal("refine.cameras", other),
             "costs and poses are not of the same bones; wire both from nodes that are called for each fragment");
 }
 
@@ -307,16 +293,14 @@ class PartlyBlind : public Split {
  public:
   PartlyBlind(const Bone& bone, std::size_t silent)
       : Split({bone.pose.world_from_model, bone.pose.world_from_model}, bone.pose.frame, 1e4), silent_(silent) {}
-  std::vector<std::string> silent_views(const RigidTransform&) const override {
-    const std::vector<std::string> all{"view 'frontal': it is black", "view 'lateral': it is black"};
+  Strings silent_views(const RigidTransform&) const override {
+    const Strings all{"view 'frontal': it is black", "view 'lateral': it is black"};
     return {all.end() - std::ptrdiff_t(silent_), all.end()};
   }
   std::string nothing_compared(const RigidTransform&) const override {
     return silent_ == 2 ? "view 'frontal': it is black; view 'lateral': it is black" : "";
   }
-  std::shared_ptr<const marrow::Cost> at_level(const marrow::CostLevel&) const override {
-    return std::make_shared<PartlyBlind>(*this);
-  }
+  std::shared_ptr<const Cost> at_level(const CostLevel&) const override { return std::make_shared<PartlyBlind>(*this); }
 
  private:
   std::size_t silent_;
@@ -326,13 +310,13 @@ TEST(RefineCameras, ABoneOfWhichTheImagesSayNothingIsNoPose) {
   const RigidTransform none = motion({0, 0, 0}, {0, 0, 0});
   std::vector<Bone> bones{Bone({none, none}), Bone({none, none})};
   bones[1].cost = std::make_shared<PartlyBlind>(bones[1], 2);
-  EXPECT_EQ(shipped::refusal("refine.cameras", inputs(bones)),
+  EXPECT_EQ(refusal("refine.cameras", inputs(bones)),
             "the images say nothing about the pose of 'proximal': view 'frontal': it is black; view 'lateral': it is "
             "black; leave this bone out, or see whether its pose, its masks and its edges are right");
   bones[1].cost = std::make_shared<PartlyBlind>(bones[1], 1);
-  const auto poses = shipped::call("refine.cameras", inputs(bones)).at("poses").as_list<marrow::Pose>();
-  EXPECT_EQ(poses[0].warnings, std::vector<std::string>{});
-  EXPECT_EQ(poses[1].warnings, std::vector<std::string>{"view 'lateral': it is black; only the other views count"});
+  const auto poses = output_list<Pose>("refine.cameras", "poses", inputs(bones));
+  EXPECT_EQ(poses[0].warnings, Strings{});
+  EXPECT_EQ(poses[1].warnings, Strings{"view 'lateral': it is black; only the other views count"});
 }
 
-}  // namespace refine_cameras_test
+}  // namespace marrow::test::refine_cameras_test

@@ -1,19 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 // Cameras that may be far off: the search that comes first, what is stated about each camera, and what the images tell.
-#include <gtest/gtest.h>
-
-#include <algorithm>
-
 #include "marrow/toolbox/geometry/camera_deviations.hpp"
 #include "split.hpp"
 
-namespace refine_cameras_test {
+namespace marrow::test::refine_cameras_test {
 
 /// Like Split, but flat from some mm and degrees on, as a contour is beyond its reach. The reach is in px, and a pixel
 /// is 600 / 1700 mm at the bone.
 class WithinReach : public Split {
  public:
-  WithinReach(const std::vector<RigidTransform>& best, const marrow::FragmentFrame& frame, double reach_px)
+  WithinReach(const std::vector<RigidTransform>& best, const FragmentFrame& frame, double reach_px)
       : Split(best, frame, 1e4), reach2_(std::pow(reach_px * 600 / 1700, 2)) {}
   double value_in_view(std::size_t view, const RigidTransform& pose) const override {
     const double full = Split::value_in_view(view, pose);
@@ -22,7 +18,7 @@ class WithinReach : public Split {
   double value(const RigidTransform& pose) const override {
     return 0.5 * (value_in_view(0, pose) + value_in_view(1, pose));
   }
-  std::shared_ptr<const marrow::Cost> at_level(const marrow::CostLevel& level) const override {
+  std::shared_ptr<const Cost> at_level(const CostLevel& level) const override {
     auto cost = std::make_shared<WithinReach>(*this);
     cost->reach2_ = std::pow(level.reach_px * 600 / 1700, 2);
     return cost;
@@ -39,7 +35,7 @@ Bone far_off() {
   const auto seen_in = [](std::size_t view, double u_px, double v_px, double depth_mm) {
     const RigidTransform world_from_camera = inverse(views()[view].camera.camera_from_world);
     RigidTransform in_camera{"camera", "camera"};
-    in_camera.rotation = marrow::rotation_from_vector(Vector3d(-v_px, u_px, 0) / 1700);
+    in_camera.rotation = rotation_from_vector(Vector3d(-v_px, u_px, 0) / 1700);
     in_camera.translation_mm = Vector3d(0, 0, depth_mm);
     return world_from_camera * in_camera * views()[view].camera.camera_from_world;
   };
@@ -51,29 +47,28 @@ Bone far_off() {
 }
 
 /// How far the pose that each corrected camera shows is from the one that its image likes best.
-double worst_cost(const Bone& bone, const shipped::Outputs& outputs) {
-  const RigidTransform pose = outputs.at("poses").as_list<marrow::Pose>()[0].world_from_model;
+double worst_cost(const Bone& bone, const Outputs& outputs) {
+  const RigidTransform pose = outputs.at("poses").as_list<Pose>()[0].world_from_model;
   return std::max(bone.cost->value_in_view(0, found(outputs, 0) * pose),
                   bone.cost->value_in_view(1, found(outputs, 1) * pose));
 }
 
 TEST(RefineCamerasThatAreFarOff, AreFoundWhereSoMuchIsExpected) {
   const Bone bone = far_off();
-  EXPECT_GT(worst_cost(bone, shipped::call("refine.cameras", inputs({bone}))), 1) << "expected: 5 px and 1 %";
-  const auto outputs =
-      shipped::call("refine.cameras", inputs({bone}),
-                    {{"focal_percent", 5.0}, {"centre_px", 60.0}, {"turn_deg", 0.01}, {"shift_mm", 0.01}});
+  EXPECT_GT(worst_cost(bone, call("refine.cameras", inputs({bone}))), 1) << "expected: 5 px and 1 %";
+  const auto outputs = call("refine.cameras", inputs({bone}),
+                            {{"focal_percent", 5.0}, {"centre_px", 60.0}, {"turn_deg", 0.01}, {"shift_mm", 0.01}});
   EXPECT_LT(worst_cost(bone, outputs), 1e-3);
-  const marrow::Pose pose = outputs.at("poses").as_list<marrow::Pose>()[0];
+  const Pose pose = outputs.at("poses").as_list<Pose>()[0];
   const Vector6d way = well::way(bone.pose.world_from_model, pose.world_from_model, pose.frame);
   for (int i = 3; i < 6; ++i)
     EXPECT_LT(std::abs(way[i]), 3 * std::sqrt((*pose.covariance)(i, i))) << "the pose is as uncertain as the cameras";
 }
 
 /// The same for what a camera file says.
-shipped::Inputs with_stated(shipped::Inputs inputs, const marrow::geometry::CameraDeviations& stated,
-                            const std::vector<std::string>& names = {"frontal", "lateral"}) {
-  marrow::List<marrow::geometry::CameraDeviations> list;
+Inputs with_stated(Inputs inputs, const geometry::CameraDeviations& stated,
+                   const Strings& names = {"frontal", "lateral"}) {
+  List<geometry::CameraDeviations> list;
   for (const std::string& name : names) list.add(name, stated);
   inputs.emplace("camera_deviations", shipped::list(list, "view"));
   return inputs;
@@ -81,24 +76,20 @@ shipped::Inputs with_stated(shipped::Inputs inputs, const marrow::geometry::Came
 
 TEST(RefineCamerasThatAreFarOff, WhatIsStatedTakesThePlaceOfTheOptions) {
   const Bone bone = far_off();
-  marrow::geometry::CameraDeviations stated;
+  geometry::CameraDeviations stated;
   stated.focal_percent = 5, stated.centre_px = 60, stated.turn_deg = 0.01, stated.shift_mm = 0.01;
-  const auto outputs = shipped::call("refine.cameras", with_stated(inputs({bone}), stated));
+  const auto outputs = call("refine.cameras", with_stated(inputs({bone}), stated));
   EXPECT_LT(worst_cost(bone, outputs), 1e-3);
-  const auto by_options =
-      shipped::call("refine.cameras", inputs({bone}),
-                    {{"focal_percent", 5.0}, {"centre_px", 60.0}, {"turn_deg", 0.01}, {"shift_mm", 0.01}});
-  EXPECT_EQ(*outputs.at("poses").as_list<marrow::Pose>()[0].covariance,
-            *by_options.at("poses").as_list<marrow::Pose>()[0].covariance);
+  const auto by_options = call("refine.cameras", inputs({bone}),
+                               {{"focal_percent", 5.0}, {"centre_px", 60.0}, {"turn_deg", 0.01}, {"shift_mm", 0.01}});
+  EXPECT_EQ(*outputs.at("poses").as_list<Pose>()[0].covariance, *by_options.at("poses").as_list<Pose>()[0].covariance);
 }
 
 TEST(RefineCamerasThatAreFarOff, SaysOfWhichParametersItKnowsMore) {
-  std::vector<std::string> said;
-  marrow::Context::Hooks hooks;
-  hooks.log = [&](std::string_view text, marrow::LogLevel) { said.emplace_back(text); };
+  Heard heard;
   const RigidTransform none = motion({0, 0, 0}, {0, 0, 0});
-  const auto outputs = shipped::call("refine.cameras", inputs({Bone({none, motion({0, 0, 0}, {-6, 0, 0})}, 1e6)}),
-                                     {{"reference_view", std::string("frontal")}}, marrow::Context(hooks));
+  const auto outputs = call("refine.cameras", inputs({Bone({none, motion({0, 0, 0}, {-6, 0, 0})}, 1e6)}),
+                            {{"reference_view", std::string("frontal")}}, heard.context);
   // The lateral camera sees the bone 6 mm farther away, 1 % of its depth: x of the world is its depth, and turned over.
   // Of a shift of 1 / sqrt(3) mm and 1 % of 600 mm, the focal length explains 36 / (36 + 1 / 3), so it is too long.
   EXPECT_NEAR(std::abs(figure(motions(outputs, 1), "shift_depth_mm")), 6, 0.05);
@@ -106,7 +97,7 @@ TEST(RefineCamerasThatAreFarOff, SaysOfWhichParametersItKnowsMore) {
               -6.0 * 6 / 5.914 / (1 + 1 / (3 * 35.0)), 0.1);
   EXPECT_GT(figure(motions(outputs, 1), "determined_focal"), 98);
   EXPECT_GT(figure(motions(outputs, 1), "predicted_focal_percent"), 0.09) << "a shift of the camera shows the same";
-  EXPECT_TRUE(std::any_of(said.begin(), said.end(), [](const std::string& line) {
+  EXPECT_TRUE(std::any_of(heard.lines.begin(), heard.lines.end(), [](const std::string& line) {
     return line.starts_with("view 'lateral': the images determine its camera's ") &&
            line.find("focal length (99 %)") != std::string::npos;
   }));
@@ -114,15 +105,15 @@ TEST(RefineCamerasThatAreFarOff, SaysOfWhichParametersItKnowsMore) {
 
 TEST(RefineCamerasThatAreFarOff, SaysWhatIsWrong) {
   const RigidTransform none = motion({0, 0, 0}, {0, 0, 0});
-  EXPECT_EQ(shipped::refusal("refine.cameras", with_stated(inputs({Bone({none, none})}), {}, {"lateral", "frontal"})),
+  EXPECT_EQ(refusal("refine.cameras", with_stated(inputs({Bone({none, none})}), {}, {"lateral", "frontal"})),
             "camera_deviations and views are not of the same views; wire both from the node that reads the views");
   auto other = inputs({Bone({none, none})});
   other["coarse_costs"] = inputs({Bone({none, none}), Bone({none, none})})["costs"];
-  EXPECT_EQ(shipped::refusal("refine.cameras", other),
+  EXPECT_EQ(refusal("refine.cameras", other),
             "coarse_costs and costs are not of the same bones; wire both from nodes that are called for each fragment");
   other["coarse_costs"] = inputs({Bone({none, none, none})})["costs"];
-  EXPECT_EQ(shipped::refusal("refine.cameras", other),
+  EXPECT_EQ(refusal("refine.cameras", other),
             "the coarse cost of 'distal' compares 3 views, but there are 2; make it of the same views");
 }
 
-}  // namespace refine_cameras_test
+}  // namespace marrow::test::refine_cameras_test

@@ -1,29 +1,23 @@
 // SPDX-License-Identifier: Apache-2.0
 // No image shows an error that all cameras share, so the poses are as uncertain as the options say.
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <array>
-#include <cmath>
 #include <marrow/domain/random.hpp>
 
 #include "split.hpp"
 
-namespace refine_cameras_test {
+namespace marrow::test::refine_cameras_test {
 
 /// The error of a pose in degrees and mm, and its covariance in these units.
 struct Outcome {
   Vector6d error;
-  marrow::Matrix6d covariance;
-  double distance2() const { return error.dot(marrow::inverse_of_symmetric(covariance) * error); }
+  Matrix6d covariance;
+  double distance2() const { return error.dot(inverse_of_symmetric(covariance) * error); }
   double deviations(int i) const { return std::abs(error[i]) / std::sqrt(covariance(i, i)); }
 };
 
-Outcome outcome(const Bone& bone, const shipped::Options& options = {}) {
-  const marrow::Pose found =
-      shipped::call("refine.cameras", inputs({bone}), options).at("poses").as_list<marrow::Pose>()[0];
+Outcome outcome(const Bone& bone, const Options& options = {}) {
+  const Pose found = output_list<Pose>("refine.cameras", "poses", inputs({bone}), options)[0];
   Vector6d unit = Vector6d::Ones();
-  unit.head<3>() *= marrow::degrees(1);
+  unit.head<3>() *= degrees(1);
   return {well::way(bone.pose.world_from_model, found.world_from_model, found.frame),
           unit.asDiagonal() * *found.covariance * unit.asDiagonal()};
 }
@@ -56,14 +50,14 @@ TEST(RefineCameras, ErrorsOfCamerasDrawnAsTheOptionsSayAreAsLargeAsPredicted) {
   // best from the noise of its image. The predicted covariance must then hold for the poses found.
   constexpr int kDraws = 100;
   constexpr double kInformation = 20;  // in each view; doubled noise makes 10 of it
-  marrow::Random random(8);
+  Random random(8);
   double sum = 0;
   int above_3 = 0, within_1 = 0;
   for (int draw = 0; draw < kDraws; ++draw) {
     Bone bone({});
     std::vector<RigidTransform> best;
     for (std::size_t v = 0; v < 2; ++v) {
-      const marrow::Camera& camera = views()[v].camera;
+      const Camera& camera = views()[v].camera;
       const Vector3d centre = bone.pose.world_from_model * bone.pose.frame.origin_mm;
       const double depth = (camera.camera_from_world * centre).z(), turn = 0.5 / std::sqrt(3.0),
                    across = std::sqrt(1 / 3.0 + 12.5 * std::pow(depth / 1700, 2)),
@@ -71,12 +65,12 @@ TEST(RefineCameras, ErrorsOfCamerasDrawnAsTheOptionsSayAreAsLargeAsPredicted) {
       Vector6d drawn, noise;
       for (double& one : drawn) one = random.normal();
       for (double& one : noise) one = random.normal() / std::sqrt(0.5 * kInformation);
-      const Eigen::Matrix3d axes = camera.camera_from_world.rotation.transpose();
+      const Matrix3d axes = camera.camera_from_world.rotation.transpose();
       RigidTransform off{"world", "world"};
-      off.rotation = marrow::rotation_from_vector(marrow::radians(turn) * axes * drawn.head<3>());
+      off.rotation = rotation_from_vector(radians(turn) * axes * drawn.head<3>());
       off.translation_mm =
           centre - off.rotation * centre + axes * drawn.tail<3>().cwiseProduct(Vector3d(across, across, along));
-      marrow::Pose seen = bone.pose;
+      Pose seen = bone.pose;
       seen.world_from_model = off * bone.pose.world_from_model;
       best.push_back(well::pose_at(seen, noise[0], noise[1], noise[2], noise[3], noise[4], noise[5]).world_from_model);
     }
@@ -90,4 +84,4 @@ TEST(RefineCameras, ErrorsOfCamerasDrawnAsTheOptionsSayAreAsLargeAsPredicted) {
   EXPECT_NEAR(within_1 / (6.0 * kDraws), 0.683, 0.05);
 }
 
-}  // namespace refine_cameras_test
+}  // namespace marrow::test::refine_cameras_test

@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "plugins/refine/sight.hpp"
+#include "tests/harness/node_test.hpp"
 
-#include <gtest/gtest.h>
+namespace marrow::test::sight_test {
 
-namespace sight_test {
-
-marrow::View view_at_600_mm() {
-  marrow::View view;
+View view_at_600_mm() {
+  View view;
   view.camera.intrinsics << 2000, 0, 100, 0, 500, 100, 0, 0, 1;
   view.camera.camera_from_world.translation_mm = {0, 0, 600};
   return view;
@@ -16,7 +15,7 @@ marrow::View view_at_600_mm() {
 // shift of 1 mm is 1 / sqrt(3) along each axis. A tenth of the shift by the principal point, 5 px * 0.3 mm, is the
 // limit of the model, and so is 0.001 mm.
 TEST(Sight, AnErrorOfTheCentreIsInMillimetresAlongEachAxis) {
-  const auto deviation = marrow::refine::sight_of(view_at_600_mm(), {0, 0, 0}, {}).deviation();
+  const auto deviation = refine::sight_of(view_at_600_mm(), {0, 0, 0}, {}).deviation();
   const double shift2 = (1 + 1e-6 + 0.15 * 0.15) / 3;
   EXPECT_NEAR(deviation[3], std::sqrt(shift2 + 12.5 * 0.3 * 0.3), 1e-12);
   EXPECT_NEAR(deviation[4], std::sqrt(shift2 + 12.5 * 1.2 * 1.2), 1e-12);
@@ -26,24 +25,24 @@ TEST(Sight, AnErrorOfTheCentreIsInMillimetresAlongEachAxis) {
 // The ray through a pixel 1 px to the right turns by 1 / 2000 about v. So a bone that is seen from the same side has
 // turned as much, and has moved by 600 / 2000 mm.
 TEST(Sight, AnErrorOfTheCentreTurnsTheBoneAboutTheSource) {
-  const auto sight = marrow::refine::sight_of(view_at_600_mm(), {0, 0, 0}, {.turn_deg = 0, .shift_mm = 0});
-  EXPECT_NEAR(sight.covariance(1, 3), 12.5 * marrow::degrees(1 / 2000.0) * 0.3, 1e-12);
-  EXPECT_NEAR(sight.covariance(0, 4), -12.5 * marrow::degrees(1 / 500.0) * 1.2, 1e-12);
+  const auto sight = refine::sight_of(view_at_600_mm(), {0, 0, 0}, {.turn_deg = 0, .shift_mm = 0});
+  EXPECT_NEAR(sight.covariance(1, 3), 12.5 * degrees(1 / 2000.0) * 0.3, 1e-12);
+  EXPECT_NEAR(sight.covariance(0, 4), -12.5 * degrees(1 / 500.0) * 1.2, 1e-12);
 }
 
 TEST(Sight, WhatIsStatedAboutACameraTakesThePlaceOfWhatIsExpected) {
-  marrow::geometry::CameraDeviations stated;
+  geometry::CameraDeviations stated;
   stated.focal_percent = 5, stated.source_mm = 40;
-  const marrow::refine::Sight sight = marrow::refine::sight_of(view_at_600_mm(), {0, 0, 0}, {}, stated);
+  const refine::Sight sight = refine::sight_of(view_at_600_mm(), {0, 0, 0}, {}, stated);
   EXPECT_NEAR(sight.deviation()[5], std::sqrt((1 + 1e-6 + 0.15 * 0.15) / 3 + 900 + 1600), 1e-9);
-  EXPECT_NEAR(sight.covariance(1, 3), 12.5 * marrow::degrees(1 / 2000.0) * 0.3, 1e-12) << "the centre as expected";
+  EXPECT_NEAR(sight.covariance(1, 3), 12.5 * degrees(1 / 2000.0) * 0.3, 1e-12) << "the centre as expected";
 }
 
 TEST(Sight, NumbersAreTheInverseOfTheMotion) {
-  const marrow::refine::Sight sight = marrow::refine::sight_of(view_at_600_mm(), {3, -8, 20}, {});
-  marrow::Vector6d numbers;
+  const refine::Sight sight = refine::sight_of(view_at_600_mm(), {3, -8, 20}, {});
+  Vector6d numbers;
   numbers << 12, -7, 4, 10, -20, 30;
   EXPECT_LT((sight.numbers(sight.motion(numbers)) - numbers).norm(), 1e-9);
 }
 
-}  // namespace sight_test
+}  // namespace marrow::test::sight_test

@@ -2,26 +2,21 @@
 #pragma once
 // Cameras, bones and costs for which the right result of refine.cameras can be computed by hand.
 #include <marrow/domain/decompositions.hpp>
-#include <marrow/domain/functions.hpp>
 
 #include "marrow/toolbox/match/views_cost.hpp"
-#include "shipped.hpp"
 #include "tests/plugins/register/well.hpp"
 
-namespace refine_cameras_test {
-
-using Eigen::Vector3d;
-using marrow::RigidTransform, marrow::Vector6d;
+namespace marrow::test::refine_cameras_test {
 
 /// Two cameras of a C-arm at right angles, 600 mm from the origin of the world, with images of 64 blocks.
-inline marrow::List<marrow::View> views(int count = 2) {
-  marrow::List<marrow::View> views;
+inline List<View> views(int count = 2) {
+  List<View> views;
   for (int i = 0; i < count; ++i) {
-    marrow::View view;
+    View view;
     view.name = i == 0 ? "frontal" : "lateral";
     view.camera.width_px = view.camera.height_px = 512;
     view.camera.intrinsics << 1700, 0, 256, 0, 1700, 256, 0, 0, 1;
-    view.camera.camera_from_world.rotation = marrow::rotation_from_vector(i * marrow::kPi / 2 * Vector3d::UnitY());
+    view.camera.camera_from_world.rotation = rotation_from_vector(i * kPi / 2 * Vector3d::UnitY());
     view.camera.camera_from_world.translation_mm = Vector3d(0, 0, 600);
     view.image.pixels = cv::Mat(512, 512, CV_16U, cv::Scalar(1000));
     views.add(view.name, view);
@@ -31,25 +26,23 @@ inline marrow::List<marrow::View> views(int count = 2) {
 
 /// Each view likes one pose best. By its blocks the cost is known as well as from `information` observations of noise
 /// 1: its noise is 1 / information.
-class Split : public marrow::Cost {
+class Split : public Cost {
  public:
-  Split(std::vector<RigidTransform> best, marrow::FragmentFrame frame, double information, double stiffness = 1)
+  Split(std::vector<RigidTransform> best, FragmentFrame frame, double information, double stiffness = 1)
       : best_(std::move(best)), frame_(frame), information_(information), stiffness_(stiffness) {}
   double value(const RigidTransform& pose) const override {
     double sum = 0;
     for (std::size_t v = 0; v < best_.size(); ++v) sum += value_in_view(v, pose) / double(best_.size());
     return sum;
   }
-  std::shared_ptr<const marrow::Cost> at_level(const marrow::CostLevel&) const override {
-    return std::make_shared<Split>(*this);
-  }
+  std::shared_ptr<const Cost> at_level(const CostLevel&) const override { return std::make_shared<Split>(*this); }
   std::size_t view_count() const override { return best_.size(); }
   double value_in_view(std::size_t view, const RigidTransform& pose) const override {
     return 0.5 * stiffness_ * well::way(best_[view], pose, frame_).squaredNorm();
   }
-  std::vector<double> without_each_block(const RigidTransform& pose) const override {
+  Numbers without_each_block(const RigidTransform& pose) const override {
     if (information_ == 0) return {};
-    std::vector<double> values;
+    Numbers values;
     for (std::size_t v = 0; v < best_.size(); ++v)
       for (int block = 0; block < 64; ++block) {
         const double slope = block < 6 ? well::way(best_[v], pose, frame_)[block] : 0;
@@ -60,22 +53,22 @@ class Split : public marrow::Cost {
 
  private:
   std::vector<RigidTransform> best_;
-  marrow::FragmentFrame frame_;
+  FragmentFrame frame_;
   double information_, stiffness_;
 };
 
 /// The same as a cost that is a mean over views.
-class SplitInViews : public marrow::match::ViewsCost {
+class SplitInViews : public match::ViewsCost {
  public:
-  explicit SplitInViews(std::shared_ptr<const marrow::Cost> cost) : ViewsCost(cost->view_count(), {}), cost_(cost) {}
-  std::shared_ptr<const marrow::Cost> at_level(const marrow::CostLevel&) const override {
+  explicit SplitInViews(std::shared_ptr<const Cost> cost) : ViewsCost(cost->view_count(), {}), cost_(cost) {}
+  std::shared_ptr<const Cost> at_level(const CostLevel&) const override {
     return std::make_shared<SplitInViews>(*this);
   }
   double value_in_view(std::size_t view, const RigidTransform& pose) const override {
     return cost_->value_in_view(view, pose);
   }
   ViewsCost::Split split(std::size_t view, const RigidTransform& pose) const override {
-    const std::vector<double> without = cost_->without_each_block(pose);
+    const Numbers without = cost_->without_each_block(pose);
     const std::size_t count = without.size() / view_count();
     ViewsCost::Split split{value_in_view(view, pose), {}};
     for (std::size_t block = 0; block < count; ++block)
@@ -85,21 +78,21 @@ class SplitInViews : public marrow::match::ViewsCost {
   }
 
  private:
-  std::shared_ptr<const marrow::Cost> cost_;
+  std::shared_ptr<const Cost> cost_;
 };
 
 /// The same with derivatives, and without blocks of values.
 class SplitWithDerivatives : public SplitInViews {
  public:
-  explicit SplitWithDerivatives(std::shared_ptr<const marrow::Cost> cost) : SplitInViews(std::move(cost)) {}
-  std::shared_ptr<const marrow::Cost> at_level(const marrow::CostLevel&) const override {
+  explicit SplitWithDerivatives(std::shared_ptr<const Cost> cost) : SplitInViews(std::move(cost)) {}
+  std::shared_ptr<const Cost> at_level(const CostLevel&) const override {
     return std::make_shared<SplitWithDerivatives>(*this);
   }
   ViewsCost::Split split(std::size_t view, const RigidTransform& pose) const override {
     return {value_in_view(view, pose), {}};
   }
   std::optional<ViewExpansion> expansion_in_view(std::size_t view, const RigidTransform& pose,
-                                                 const marrow::FragmentFrame& frame) const override {
+                                                 const FragmentFrame& frame) const override {
     constexpr double kStep = 1e-4;  // rad and mm
     const auto values = [&](const Vector6d& step) {
       const ViewsCost::Split split = SplitInViews::split(view, moved(pose, frame, step));
@@ -126,26 +119,26 @@ class SplitWithDerivatives : public SplitInViews {
 struct Bone {
   explicit Bone(const std::vector<RigidTransform>& motions, double information = 1e4, double at_mm = 40) {
     pose.frame.origin_mm = Vector3d(10, 0, 0);
-    pose.world_from_model.rotation = marrow::rotation_from_vector({0.3, -0.2, 0.5});
+    pose.world_from_model.rotation = rotation_from_vector({0.3, -0.2, 0.5});
     pose.world_from_model.translation_mm = Vector3d(0, at_mm, 0);
     std::vector<RigidTransform> best;
     for (const RigidTransform& motion : motions) best.push_back(motion * pose.world_from_model);
     cost = std::make_shared<Split>(best, pose.frame, information);
   }
-  marrow::Pose pose;
-  std::shared_ptr<const marrow::Cost> cost;
+  Pose pose;
+  std::shared_ptr<const Cost> cost;
 };
 
 inline RigidTransform motion(const Vector3d& rotation_deg, const Vector3d& shift_mm) {
   RigidTransform world_from_world{"world", "world"};
-  world_from_world.rotation = marrow::rotation_from_vector(marrow::radians(1) * rotation_deg);
+  world_from_world.rotation = rotation_from_vector(radians(1) * rotation_deg);
   world_from_world.translation_mm = shift_mm;
   return world_from_world;
 }
 
-inline shipped::Inputs inputs(const std::vector<Bone>& bones, const marrow::List<marrow::View>& of = views()) {
-  marrow::List<marrow::Cost> costs;
-  marrow::List<marrow::Pose> poses;
+inline Inputs inputs(const std::vector<Bone>& bones, const List<View>& of = views()) {
+  List<Cost> costs;
+  List<Pose> poses;
   for (std::size_t i = 0; i < bones.size(); ++i) {
     costs.add_shared(i ? "proximal" : "distal", bones[i].cost);
     poses.add(i ? "proximal" : "distal", bones[i].pose);
@@ -156,15 +149,13 @@ inline shipped::Inputs inputs(const std::vector<Bone>& bones, const marrow::List
 }
 
 /// The motion of the world that the corrected camera of a view stands for.
-inline RigidTransform found(const shipped::Outputs& outputs, std::size_t view) {
+inline RigidTransform found(const Outputs& outputs, std::size_t view) {
   return inverse(views()[view].camera.camera_from_world) *
-         outputs.at("views").as_list<marrow::View>()[view].camera.camera_from_world;
+         outputs.at("views").as_list<View>()[view].camera.camera_from_world;
 }
-inline marrow::Metrics motions(const shipped::Outputs& outputs, std::size_t view) {
-  return outputs.at("motions").as_list<marrow::Metrics>()[view];
+inline Metrics motions(const Outputs& outputs, std::size_t view) {
+  return outputs.at("motions").as_list<Metrics>()[view];
 }
-inline double figure(const marrow::Metrics& metrics, const std::string& name) {
-  return shipped::figure(shipped::item(metrics), name);
-}
+inline double figure(const Metrics& metrics, const std::string& name) { return shipped::figure(item(metrics), name); }
 
-}  // namespace refine_cameras_test
+}  // namespace marrow::test::refine_cameras_test

@@ -2,15 +2,9 @@
 #pragma once
 // Edge maps as a perfect detector would give them: the outline of a model at the true pose, and the ways in which a
 // real detector falls short of that.
-#include <algorithm>
-#include <marrow/domain/case.hpp>
-#include <marrow/domain/features.hpp>
-#include <marrow/domain/functions.hpp>
-#include <random>
-
 #include "tests/plugins/project/shapes.hpp"
 
-namespace ideal_edges {
+namespace marrow::test::ideal_edges {
 
 struct Faults {
   double noise_px = 0;   ///< independent, along the gradient
@@ -21,17 +15,17 @@ struct Faults {
   unsigned seed = 1;
 };
 
-inline marrow::EdgeMap edges_of(const marrow::OutlineProjector& projector, const marrow::Camera& camera,
-                                const marrow::RigidTransform& world_from_model, const Faults& faults) {
+inline EdgeMap edges_of(const OutlineProjector& projector, const Camera& camera, const RigidTransform& world_from_model,
+                        const Faults& faults) {
   std::mt19937 random(faults.seed);
   std::normal_distribution<double> normal;
   std::uniform_real_distribution<double> uniform;
-  marrow::EdgeMap map{camera.width_px, camera.height_px, {}};
+  EdgeMap map{camera.width_px, camera.height_px, {}};
   const auto add = [&](double u, double v, double du, double dv) {
     if (u < 0 || v < 0 || u > camera.width_px - 1 || v > camera.height_px - 1) return;
     map.pixels.push_back({float(u), float(v), float(du), float(dv), 1});
   };
-  std::vector<double> gaps;
+  Numbers gaps;
   for (int i = 0; i < 64; ++i) gaps.push_back(uniform(random));
   for (const auto& p : projector.outline(camera, world_from_model, 1)) {
     // A gap is a cell of 64 x 64 pixels without edges.
@@ -42,26 +36,26 @@ inline marrow::EdgeMap edges_of(const marrow::OutlineProjector& projector, const
     if (faults.canal) add(p.u_px - 20 * p.normal_u, p.v_px - 20 * p.normal_v, -p.normal_u, -p.normal_v);
   }
   for (int i = 0; i < faults.outliers; ++i) {
-    const double angle = 2 * marrow::kPi * uniform(random);
+    const double angle = 2 * kPi * uniform(random);
     add(uniform(random) * camera.width_px, uniform(random) * camera.height_px, std::cos(angle), std::sin(angle));
   }
-  const auto place = [](const marrow::EdgePixel& e) { return std::pair(std::lround(e.v_px), std::lround(e.u_px)); };
+  const auto place = [](const EdgePixel& e) { return std::pair(std::lround(e.v_px), std::lround(e.u_px)); };
   std::stable_sort(map.pixels.begin(), map.pixels.end(),
                    [&](const auto& a, const auto& b) { return place(a) < place(b); });
   return map;
 }
 
 struct Scene {
-  marrow::List<marrow::View> views;
-  marrow::List<marrow::EdgeMap> edges;
+  List<View> views;
+  List<EdgeMap> edges;
 };
 
-inline Scene scene_of(const marrow::OutlineProjector& projector, const marrow::RigidTransform& world_from_model,
-                      const std::vector<double>& angles_deg, const Faults& faults = {}) {
+inline Scene scene_of(const OutlineProjector& projector, const RigidTransform& world_from_model,
+                      const Numbers& angles_deg, const Faults& faults = {}) {
   Scene scene;
   for (const double angle : angles_deg) {
     const std::string name = "at_" + std::to_string(int(angle));
-    marrow::View view{name, {}, shapes::c_arm(angle), {}};
+    View view{name, {}, shapes::c_arm(angle), {}};
     Faults own = faults;
     own.seed = faults.seed * 1000 + unsigned(angle);
     scene.edges.add(name, edges_of(projector, view.camera, world_from_model, own));
@@ -70,4 +64,4 @@ inline Scene scene_of(const marrow::OutlineProjector& projector, const marrow::R
   return scene;
 }
 
-}  // namespace ideal_edges
+}  // namespace marrow::test::ideal_edges

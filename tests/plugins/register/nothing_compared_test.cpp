@@ -1,18 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 // Images that say nothing about a pose: no search may end in a pose there. Every cost is tried in every way in which it
 // can have nothing to compare: by construction, the bone, the edges or the pixels are missing.
-#include <gtest/gtest.h>
-
 #include <set>
 
 #include "marrow/similarity/invisible.hpp"
 #include "marrow/similarity/x_ray_view.hpp"
 #include "marrow/toolbox/analytic/body.hpp"
-#include "shipped.hpp"
+#include "tests/harness/node_test.hpp"
 
-namespace nothing_compared_test {
-
-using namespace marrow;
+namespace marrow::test::nothing_compared_test {
 
 constexpr int kSize_px = 120;
 constexpr double kPixel_mm = 1.6;
@@ -38,7 +34,7 @@ struct Scene {
       views.add(view.name, view);
     }
     start.frame = fragment_frame(analytic::mesh_of(bone()));
-    start.world_from_model = moved(truth(), start.frame, Vector6d::Constant(0.01));
+    start.world_from_model = marrow::moved(truth(), start.frame, Vector6d::Constant(0.01));
   }
   void draw_nothing() {
     const auto invisible = std::make_shared<const analytic::InvisibleProjector>(PixelGrid{20, 20, 1, 80, 80});
@@ -56,39 +52,39 @@ struct Scene {
     }
     views = changed_views, edges = changed_edges;
   }
-  void shift(const Eigen::Vector3d& by_mm) { start.world_from_model.translation_mm += by_mm; }
+  void shift(const Vector3d& by_mm) { start.world_from_model.translation_mm += by_mm; }
 };
 
 bool has(const std::string& node, const std::string& port) {
-  for (const PortInfo& one : shipped::definition_of(node).info.inputs)
+  for (const PortInfo& one : definition_of(node).info.inputs)
     if (one.name == port) return true;
   return false;
 }
 
 /// A node's inputs and its cost, which refers to them.
 struct Made {
-  shipped::Inputs inputs;
+  Inputs inputs;
   Value cost;
   Made(const std::string& node, const Scene& scene) {
     const Grid grid = analytic::grid_of({68, 56, 100}, {1, 1, 1});
-    for (const PortInfo& port : shipped::definition_of(node).info.inputs) {
+    for (const PortInfo& port : definition_of(node).info.inputs) {
       if (port.name == "projector" && port.type.id == TypeInfo::of<OutlineProjector>().id)
         inputs["projector"] = Value::of<OutlineProjector>(scene.outline);
       else if (port.name == "projector")
         inputs["projector"] = Value::of<RadiographProjector>(scene.radiograph);
       if (port.name == "views") inputs["views"] = shipped::list(scene.views, "view");
       if (port.name == "edges") inputs["edges"] = shipped::list(scene.edges, "view");
-      if (port.name == "model") inputs["model"] = shipped::item(analytic::mesh_of(bone()));
-      if (port.name == "volume") inputs["volume"] = shipped::item(analytic::volume_of(bone(), grid, 700, 0));
-      if (port.name == "field") inputs["field"] = shipped::item(analytic::field_of(bone(), grid, 6));
+      if (port.name == "model") inputs["model"] = item(analytic::mesh_of(bone()));
+      if (port.name == "volume") inputs["volume"] = item(analytic::volume_of(bone(), grid, 700, 0));
+      if (port.name == "field") inputs["field"] = item(analytic::field_of(bone(), grid, 6));
     }
-    cost = shipped::call(node, inputs).at("cost");
+    cost = call(node, inputs).at("cost");
   }
 };
 
-shipped::Options one_level(const std::string& node) {
-  const auto one = [](double value) { return OptionValue(std::vector<double>{value}); };
-  shipped::Options options{{"contour_spacing_px", one(2)}, {"reach_px", one(6)}};
+Options one_level(const std::string& node) {
+  const auto one = [](double value) { return OptionValue(Numbers{value}); };
+  Options options{{"contour_spacing_px", one(2)}, {"reach_px", one(6)}};
   if (node == "initial.best_of") return {{"contour_spacing_px", 2.0}, {"reach_px", 6.0}};
   if (node == "initial.global_search")
     return {{"contour_spacing_px", one(2)},
@@ -112,30 +108,29 @@ shipped::Options one_level(const std::string& node) {
   return options;
 }
 
-shipped::Inputs inputs_of(const std::string& node, const Made& made, const Pose& start) {
-  shipped::Inputs inputs{{"cost", made.cost},
-                         {"optimizer", shipped::call("optimizer.nelder_mead", {}).at("optimizer")}};
+Inputs inputs_of(const std::string& node, const Made& made, const Pose& start) {
+  Inputs inputs{{"cost", made.cost}, {"optimizer", call("optimizer.nelder_mead", {}).at("optimizer")}};
   if (node == "initial.best_of") {
-    inputs["first"] = shipped::item(start);
+    inputs["first"] = item(start);
   } else if (node == "initial.global_search") {
-    inputs["start"] = shipped::item(start);
-    inputs["model"] = shipped::item(analytic::mesh_of(bone()));
+    inputs["start"] = item(start);
+    inputs["model"] = item(analytic::mesh_of(bone()));
   } else {
-    inputs["start"] = shipped::item(start);
+    inputs["start"] = item(start);
   }
   if (node == "register.sequence") inputs["finer_cost"] = made.cost;
   return inputs;
 }
 
-const std::vector<std::string> kSearches{"register.multiresolution", "register.sequence", "register.tracked",
-                                         "initial.global_search", "initial.best_of"};
-const std::vector<std::string> kCosts{"contour_distance",      "drr_edges",
-                                      "entropy_of_difference", "gradient_correlation",
-                                      "gradient_difference",   "gradient_orientation",
-                                      "gradient_projection",   "metal_gradient_correlation",
-                                      "mutual_information",    "normalised_cross_correlation",
-                                      "patch_correlation",     "patch_gradient_correlation",
-                                      "pattern_intensity",     "ray_to_surface"};
+const Strings kSearches{"register.multiresolution", "register.sequence", "register.tracked", "initial.global_search",
+                        "initial.best_of"};
+const Strings kCosts{"contour_distance",      "drr_edges",
+                     "entropy_of_difference", "gradient_correlation",
+                     "gradient_difference",   "gradient_orientation",
+                     "gradient_projection",   "metal_gradient_correlation",
+                     "mutual_information",    "normalised_cross_correlation",
+                     "patch_correlation",     "patch_gradient_correlation",
+                     "pattern_intensity",     "ray_to_surface"};
 
 /// What a search says of a cost in a scene; empty if it gives a pose.
 std::string refusal(const std::string& search, const std::string& cost, const Scene& scene) {
@@ -221,8 +216,7 @@ TEST(NothingCompared, SoundImagesAreAPoseWithDeviations) {
   for (const std::string& name : kCosts) {
     const Made made("similarity." + name, scene);
     for (const std::string& search : kSearches) {
-      const Pose pose =
-          shipped::call(search, inputs_of(search, made, scene.start), one_level(search)).at("pose").as<Pose>();
+      const Pose pose = output<Pose>(search, "pose", inputs_of(search, made, scene.start), one_level(search));
       if (search.starts_with("initial")) continue;  // without deviations
       ASSERT_EQ(bool(pose.covariance), !predict_none.contains(name)) << name << ", " << search;
       if (!pose.covariance) continue;
@@ -238,8 +232,7 @@ TEST(NothingCompared, AViewThatShowsNothingIsNamedWhereAnotherShowsTheBone) {
   });
   const Made made("similarity.normalised_cross_correlation", scene);
   for (const std::string search : {"register.multiresolution", "register.sequence", "register.tracked"}) {
-    const Pose pose =
-        shipped::call(search, inputs_of(search, made, scene.start), one_level(search)).at("pose").as<Pose>();
+    const Pose pose = output<Pose>(search, "pose", inputs_of(search, made, scene.start), one_level(search));
     const std::string expected = "view 'lateral': no pixel inside the mask shows the bone; only the other views count";
     EXPECT_EQ(std::count(pose.warnings.begin(), pose.warnings.end(), expected), 1) << search;
     EXPECT_TRUE(pose.covariance->allFinite() && pose.covariance->diagonal().minCoeff() > 0) << search;
@@ -250,8 +243,8 @@ TEST(NothingCompared, ASurfaceTurnedInsideOutIsNoPose) {
   Scene scene;
   Mesh mesh = analytic::mesh_of(bone());
   for (auto& triangle : mesh.triangles) std::swap(triangle[1], triangle[2]);
-  const Value kept = shipped::item(mesh);
-  const Value projector = shipped::call("project.silhouette_edges", {{"model", kept}}).at("projector");
+  const Value kept = item(mesh);
+  const Value projector = call("project.silhouette_edges", {{"model", kept}}).at("projector");
   scene.outline = std::static_pointer_cast<const OutlineProjector>(projector.data);
   for (const std::string& search : kSearches)
     EXPECT_NE(refusal(search, "similarity.contour_distance", scene)
@@ -261,4 +254,4 @@ TEST(NothingCompared, ASurfaceTurnedInsideOutIsNoPose) {
         << search;
 }
 
-}  // namespace nothing_compared_test
+}  // namespace marrow::test::nothing_compared_test

@@ -2,53 +2,39 @@
 // The axes of a search: a start from a file or from Python has none of its own. The bowl is 4 degrees wide about the
 // cylinder's axis, which lies along (1, 1, 1); so about each of the CT's axes it is sqrt((4^2 + 0.1^2 + 0.1^2) / 3) =
 // 2.31 degrees wide.
-#include <gtest/gtest.h>
-
-#include <cmath>
-
 #include "bowl.hpp"
-#include "shipped.hpp"
-#include "tests/plugins/evaluate/listener.hpp"
 #include "tests/plugins/project/shapes.hpp"
 
-namespace start_axes_test {
-
-using marrow::Cost, marrow::FragmentFrame, marrow::Matrix6d, marrow::Pose;
+namespace marrow::test::start_axes_test {
 
 /// A cylinder along (1, 1, 1), with its middle at the CT's origin.
-marrow::Mesh oblique_cylinder() {
-  marrow::Mesh mesh = shapes::cylinder(12, 120);
-  const Eigen::Vector3d middle = marrow::fragment_frame(mesh).origin_mm;
-  const Eigen::Matrix3d turn =
-      Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d::UnitZ(), Eigen::Vector3d::Ones()).toRotationMatrix();
-  for (Eigen::Vector3d& vertex : mesh.vertices_mm) vertex = turn * (vertex - middle);
+Mesh oblique_cylinder() {
+  Mesh mesh = shapes::cylinder(12, 120);
+  const Vector3d middle = fragment_frame(mesh).origin_mm;
+  const Matrix3d turn = Eigen::Quaterniond::FromTwoVectors(Vector3d::UnitZ(), Vector3d::Ones()).toRotationMatrix();
+  for (Vector3d& vertex : mesh.vertices_mm) vertex = turn * (vertex - middle);
   return mesh;
 }
 
 /// A registration that begins at the bottom of the bowl, with the CT's axes.
 struct Trial {
-  marrow::Mesh mesh = oblique_cylinder();
-  listener::Listener listener;
-  shipped::Inputs inputs;
+  Mesh mesh = oblique_cylinder();
+  Heard listener;
+  Inputs inputs;
 
   explicit Trial(bool with_model) {
-    Pose start;
-    start.world_from_model.translation_mm = {3, -4, 500};
+    const Pose start = test::pose_at({3, -4, 500});
     Matrix6d hessian = Matrix6d::Zero();
     hessian.diagonal() << 100, 100, 1.0 / 16, 100, 100, 100;
-    inputs = {{"cost", marrow::Value::of<Cost>(std::make_shared<const well::Bowl>(
-                           start.world_from_model, marrow::fragment_frame(mesh), hessian))},
-              {"optimizer", shipped::call("optimizer.nelder_mead", {}).at("optimizer")},
-              {"start", shipped::item(start)}};
-    if (with_model) inputs["model"] = shipped::item(mesh);
+    inputs = well::searched(std::make_shared<well::Bowl>(start.world_from_model, fragment_frame(mesh), hessian), start);
+    if (with_model) inputs["model"] = item(mesh);
   }
   Pose run(const std::string& node) {
-    shipped::Inputs all = inputs;
+    Inputs all = inputs;
     if (node == "register.sequence") all["finer_cost"] = inputs.at("cost");
-    const shipped::Options options = node == "register.tracked"
-                                         ? shipped::Options{}
-                                         : shipped::Options{{"scan_rotation_deg", 0.0}, {"scan_translation_mm", 0.0}};
-    return shipped::call(node, all, options, listener.context).at("pose").as<Pose>();
+    const Options options =
+        node == "register.tracked" ? Options{} : Options{{"scan_rotation_deg", 0.0}, {"scan_translation_mm", 0.0}};
+    return output<Pose>(node, "pose", all, options, listener.context);
   }
 };
 
@@ -58,16 +44,16 @@ TEST(StartAxes, AreThoseOfTheModelIfTheStartHasNone) {
   for (const char* node : kNodes) {
     Trial trial(true);
     const Pose pose = trial.run(node);
-    const FragmentFrame expected = marrow::fragment_frame(trial.mesh);
+    const FragmentFrame expected = fragment_frame(trial.mesh);
     EXPECT_TRUE(pose.frame.is_anatomical) << node;
     EXPECT_LT((pose.frame.axes - expected.axes).norm() + (pose.frame.origin_mm - expected.origin_mm).norm(), 1e-9);
-    EXPECT_NEAR(marrow::degrees(std::sqrt((*pose.covariance)(2, 2))), 4, 0.1) << node;
+    EXPECT_NEAR(degrees(std::sqrt((*pose.covariance)(2, 2))), 4, 0.1) << node;
     for (const std::string& warning : trial.listener.warnings) EXPECT_EQ(warning.find("no axes"), std::string::npos);
   }
   Trial trial(true);
-  EXPECT_EQ(trial.run("register.multiresolution").warnings,
-            std::vector<std::string>{
-                "axial rotation is poorly determined by these images: its predicted standard deviation is 4 degrees"});
+  EXPECT_EQ(
+      trial.run("register.multiresolution").warnings,
+      Strings{"axial rotation is poorly determined by these images: its predicted standard deviation is 4 degrees"});
 }
 
 TEST(StartAxes, WithoutAModelNobodySpeaksOfALongAxis) {
@@ -79,39 +65,34 @@ TEST(StartAxes, WithoutAModelNobodySpeaksOfALongAxis) {
     EXPECT_EQ(trial.listener.warnings[0],
               "the start has no axes of the bone, and no model gives them: rotations are about the x, y and z axes of "
               "'ct', and which direction is the long axis is not known; wire the bone's surface to 'model'");
-    EXPECT_NEAR(marrow::degrees(std::sqrt((*pose.covariance)(2, 2))), 2.31, 0.1) << node;
+    EXPECT_NEAR(degrees(std::sqrt((*pose.covariance)(2, 2))), 2.31, 0.1) << node;
     for (const std::string& warning : pose.warnings) EXPECT_EQ(warning.find("axial"), std::string::npos) << warning;
   }
   // 2.31 degrees about each axis are below the limit of 3. The direction between them is not.
   Trial trial(false);
   EXPECT_EQ(trial.run("register.multiresolution").warnings,
-            std::vector<std::string>{"rotation about the direction (0.577, 0.577, 0.577) is poorly determined by these "
-                                     "images: its predicted standard deviation is 4 degrees"});
+            Strings{"rotation about the direction (0.577, 0.577, 0.577) is poorly determined by these "
+                    "images: its predicted standard deviation is 4 degrees"});
 }
 
 TEST(StartAxes, TheCovarianceOfAPredictionIsTurnedToo) {
   // 1 degree about the cylinder's axis and 0.2 across it, told about the CT's axes.
   Trial trial(true);
-  const FragmentFrame frame = marrow::fragment_frame(trial.mesh);
-  Pose predicted;
-  predicted.world_from_model = trial.inputs.at("start").as<Pose>().world_from_model;
+  const FragmentFrame frame = fragment_frame(trial.mesh);
+  Pose predicted = trial.inputs.at("start").as<Pose>();
   predicted.frame = frame;
-  Matrix6d covariance = Matrix6d::Identity();
-  covariance.diagonal().head<3>() = (Eigen::Vector3d(0.2, 0.2, 1) * marrow::radians(1)).cwiseAbs2();
-  predicted.covariance = covariance;
-  Pose given = in_frame(predicted, FragmentFrame());
-  trial.inputs["start"] = shipped::item(given);
-  const auto out = shipped::call("register.tracked", trial.inputs);
-  const Pose& told = out.at("stages").as_list<Pose>()[0];
-  EXPECT_LT((*told.covariance - covariance).norm(), 1e-12);
+  predicted = with_deviations(predicted, {0.2, 0.2, 1, 1, 1, 1});
+  trial.inputs["start"] = item(in_frame(predicted, FragmentFrame()));
+  const Pose told = output_list<Pose>("register.tracked", "stages", trial.inputs)[0];
+  EXPECT_LT((*told.covariance - *predicted.covariance).norm(), 1e-12);
 }
 
 TEST(StartAxes, RefusesTheModelOfAnotherBone) {
   Trial trial(true);
   trial.mesh.frame = "elsewhere";
-  trial.inputs["model"] = shipped::item(trial.mesh);
+  trial.inputs["model"] = item(trial.mesh);
   EXPECT_EQ(
-      shipped::refusal("register.multiresolution", trial.inputs),
+      refusal("register.multiresolution", trial.inputs),
       "the model is in the frame 'elsewhere', but the pose takes points in 'ct'; give the model that was registered");
 }
 
@@ -119,9 +100,9 @@ TEST(StartAxes, WarningsOfTheStartAreNotOfThePose) {
   Trial trial(true);
   Pose start = trial.inputs.at("start").as<Pose>();
   start.warnings = {"the landmarks lie nearly on a line"};
-  trial.inputs["start"] = shipped::item(start);
+  trial.inputs["start"] = item(start);
   for (const char* node : kNodes)
     for (const std::string& warning : trial.run(node).warnings) EXPECT_NE(warning, start.warnings[0]) << node;
 }
 
-}  // namespace start_axes_test
+}  // namespace marrow::test::start_axes_test

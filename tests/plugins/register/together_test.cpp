@@ -1,14 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // register.together on two bones that give way to each other: everything is known by hand.
-#include <gtest/gtest.h>
-
 #include "bowl.hpp"
 #include "marrow/toolbox/match/among_others.hpp"
-#include "shipped.hpp"
 
-namespace together_test {
-
-using namespace marrow;
+namespace marrow::test::together_test {
 
 constexpr double kInformation = 100;
 
@@ -45,20 +40,14 @@ class Coupled : public well::Bowl, public match::CostAmongOthers {
 Pose first() { return well::truth(); }
 Pose second() { return well::pose_at(well::truth(), 10, -5, 20, 30, 4, -2); }
 
-double off(const Pose& found, const Pose& bottom) {
-  return well::way(bottom.world_from_model, found.world_from_model, bottom.frame).norm();
-}
-
-shipped::Inputs inputs(double coupling) {
+Inputs inputs(double coupling) {
   List<Cost> costs;
   costs.add_shared("first", std::make_shared<Coupled>(first(), second(), "second", coupling));
   costs.add_shared("second", std::make_shared<Coupled>(second(), first(), "first", coupling));
-  List<Pose> starts;
-  starts.add("first", well::pose_at(first(), 1, -1, 2, 1, -1, 1));
-  starts.add("second", well::pose_at(second(), 1, 2, 1, -1, 1, 2));
-  return {{"costs", shipped::list(costs, "fragment")},
-          {"starts", shipped::list(starts, "fragment")},
-          {"optimizer", shipped::call("optimizer.bobyqa", {}).at("optimizer")}};
+  return {{"costs", list(costs, "fragment")},
+          {"starts", per_fragment("first", well::pose_at(first(), 1, -1, 2, 1, -1, 1), "second",
+                                  well::pose_at(second(), 1, 2, 1, -1, 1, 2))},
+          {"optimizer", call("optimizer.bobyqa", {}).at("optimizer")}};
 }
 
 class Coupling : public testing::TestWithParam<double> {};
@@ -66,18 +55,18 @@ INSTANTIATE_TEST_SUITE_P(Together, Coupling, testing::Values(0.0, 0.6, -0.9));
 
 /// In turn alone, an error falls by the squared coupling with each round: with 0.9, four rounds a level leave a fifth.
 TEST_P(Coupling, BothBonesAreFound) {
-  const auto out = shipped::call("register.together", inputs(GetParam()));
+  const auto out = call("register.together", inputs(GetParam()));
   const auto poses = out.at("poses").as_list<Pose>();
-  ASSERT_EQ(poses.names(), (std::vector<std::string>{"first", "second"}));
-  EXPECT_LT(off(poses[0], first()), 0.05);
-  EXPECT_LT(off(poses[1], second()), 0.05);
-  EXPECT_LT(off(out.at("pose").as<Pose>(), poses[0]), 1e-9);
+  ASSERT_EQ(poses.names(), (Strings{"first", "second"}));
+  EXPECT_LT(well::apart(first(), poses[0]), 0.05);
+  EXPECT_LT(well::apart(second(), poses[1]), 0.05);
+  EXPECT_LT(well::apart(poses[0], out.at("pose").as<Pose>()), 1e-9);
 }
 
 /// With the other bone exact, each axis is known to 0.1. With the information (1, c; c, 1) of both, its variance is
 /// 1 / (1 - c^2) times as large.
 TEST_P(Coupling, TheDeviationsCountThoseOfTheOtherBone) {
-  const auto poses = shipped::call("register.together", inputs(GetParam())).at("poses").as_list<Pose>();
+  const auto poses = output_list<Pose>("register.together", "poses", inputs(GetParam()));
   const double expected = 0.1 / std::sqrt(1 - GetParam() * GetParam());
   for (const Pose& pose : poses)
     for (int axis = 0; axis < 6; ++axis) {
@@ -87,16 +76,11 @@ TEST_P(Coupling, TheDeviationsCountThoseOfTheOtherBone) {
 }
 
 TEST(Together, RefusesOtherBonesThanThoseOfTheCosts) {
-  shipped::Inputs mixed = inputs(0);
-  List<Pose> starts;
-  starts.add("first", first());
-  mixed["starts"] = shipped::list(starts, "fragment");
-  EXPECT_EQ(shipped::refusal("register.together", mixed),
+  EXPECT_EQ(refusal("register.together", with(inputs(0), {{"starts", per_fragment("first", first())}})),
             "costs and starts are not of the same bones; wire both from nodes that are called for each fragment");
-  shipped::Inputs none = inputs(0);
-  none["starts"] = shipped::list(List<Pose>(), "fragment");
-  none["costs"] = shipped::list(List<Cost>(), "fragment");
-  EXPECT_EQ(shipped::refusal("register.together", none), "there is no bone; wire the start of at least one");
+  EXPECT_EQ(refusal("register.together", with(inputs(0), {{"starts", list(List<Pose>(), "fragment")},
+                                                          {"costs", list(List<Cost>(), "fragment")}})),
+            "there is no bone; wire the start of at least one");
 }
 
-}  // namespace together_test
+}  // namespace marrow::test::together_test

@@ -1,12 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <gtest/gtest.h>
+#include "tests/harness/node_test.hpp"
 
-#include "shipped.hpp"
-
-namespace curves_test {
-
-using marrow::List;
-using marrow::Metrics;
+namespace marrow::test::curves_test {
 
 List<Metrics> frames(double slope) {
   List<Metrics> list;
@@ -15,11 +10,8 @@ List<Metrics> frames(double slope) {
   return list;
 }
 
-cv::Mat drawn(const List<Metrics>& metrics, const shipped::Options& options = {}) {
-  return shipped::call("render.curves", {{"metrics", shipped::list(metrics, "frame")}}, options)
-      .at("picture")
-      .as<marrow::Picture>()
-      .pixels;
+cv::Mat drawn(const List<Metrics>& metrics, const Options& options = {}) {
+  return output<Picture>("render.curves", "picture", {{"metrics", shipped::list(metrics, "frame")}}, options).pixels;
 }
 
 /// The mean row of the blue curve in the left or right third of the first plot.
@@ -41,11 +33,11 @@ TEST(Curves, RiseAndFallAsTheFiguresDo) {
 }
 
 TEST(Curves, SayWhatIsMissing) {
-  EXPECT_EQ(shipped::refusal("render.curves", {{"metrics", shipped::list(frames(1), "frame")}},
-                             {{"figures", std::vector<std::string>{"flexion"}}}),
-            "there is no figure 'flexion'; there are flexion_deg, shift_mm");
-  EXPECT_EQ(shipped::refusal("render.curves", {{"metrics", shipped::list(List<Metrics>(), "frame")}}),
+  EXPECT_EQ(
+      refusal("render.curves", {{"metrics", shipped::list(frames(1), "frame")}}, {{"figures", Strings{"flexion"}}}),
+      "there is no figure 'flexion'; there are flexion_deg, shift_mm");
+  EXPECT_EQ(refusal("render.curves", {{"metrics", shipped::list(List<Metrics>(), "frame")}}),
             "there is no frame to draw");
 }
 
-}  // namespace curves_test
+}  // namespace marrow::test::curves_test

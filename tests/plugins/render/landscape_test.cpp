@@ -1,18 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <gtest/gtest.h>
-
 #include "marrow/render/plot.hpp"
-#include "shipped.hpp"
 #include "tests/plugins/render/pictures.hpp"
 
-namespace landscape_test {
+namespace marrow::test::landscape_test {
 
-using namespace marrow::draw;
-using Profile = marrow::Landscape::Profile;
+using namespace draw;
+using Profile = Landscape::Profile;
 
 /// Parabolas (x - 2.5)^2 over -10 to 10, their truth at +5.
-marrow::Landscape parabolas() {
-  marrow::Landscape landscape;
+Landscape parabolas() {
+  Landscape landscape;
   for (int axis = 0; axis < 6; ++axis) {
     Profile profile{"rotation about the long axis", "deg", {}, {}, 5.0};
     for (int i = 0; i <= 80; ++i) {
@@ -24,11 +21,8 @@ marrow::Landscape parabolas() {
   return landscape;
 }
 
-cv::Mat draw(const marrow::Landscape& landscape) {
-  return shipped::call("render.landscape", {{"landscape", shipped::item(landscape)}})
-      .at("picture")
-      .as<marrow::Picture>()
-      .pixels;
+cv::Mat draw(const Landscape& landscape) {
+  return output<Picture>("render.landscape", "picture", {{"landscape", item(landscape)}}).pixels;
 }
 
 /// Whether the first plot has this title, above its axes and to the right of the label of its costs.
@@ -65,16 +59,16 @@ TEST(Landscape, DrawsSixPlotsWithTheirMarks) {
 }
 
 TEST(Landscape, CostsThatAreNotFiniteGiveAPictureThatSaysSo) {
-  const marrow::Landscape nothing{{{"rotation about the long axis", "deg", {-1, 0, 1}, {NAN, NAN, NAN}, {}}}};
+  const Landscape nothing{{{"rotation about the long axis", "deg", {-1, 0, 1}, {NAN, NAN, NAN}, {}}}};
   EXPECT_TRUE(is_titled(draw(nothing), "rotation about the long axis: no finite cost"));
   EXPECT_FALSE(draw({}).empty());
 }
 
 TEST(Plot, TicksAreRound) {
-  EXPECT_EQ(round_ticks(-10, 10, 4), (std::vector<double>{-10, -5, 0, 5, 10}));
-  EXPECT_EQ(round_ticks(0.3, 4.2, 4), (std::vector<double>{1, 2, 3, 4}));
+  EXPECT_EQ(round_ticks(-10, 10, 4), (Numbers{-10, -5, 0, 5, 10}));
+  EXPECT_EQ(round_ticks(0.3, 4.2, 4), (Numbers{1, 2, 3, 4}));
   EXPECT_TRUE(round_ticks(1, 1, 4).empty());
   EXPECT_TRUE(round_ticks(0, std::nan(""), 4).empty());
 }
 
-}  // namespace landscape_test
+}  // namespace marrow::test::landscape_test

@@ -1,23 +1,19 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <gtest/gtest.h>
-
 #include "marrow/toolbox/draw/canvas.hpp"
-#include "shipped.hpp"
-#include "tests/harness/message_of.hpp"
 #include "tests/plugins/render/pictures.hpp"
 
-namespace overlay_test {
+namespace marrow::test::overlay_test {
 
-using namespace marrow::draw;
+using namespace draw;
 using pictures::has;
 
 /// A square outline of 40 px about the image point of the model's origin.
-class SquareProjector : public marrow::OutlineProjector {
+class SquareProjector : public OutlineProjector {
  public:
-  std::vector<marrow::OutlinePoint> outline(const marrow::Camera& camera,
-                                            const marrow::RigidTransform& world_from_model, double) const override {
-    const Eigen::Vector2d c = marrow::project(camera, world_from_model.translation_mm);
-    std::vector<marrow::OutlinePoint> points;
+  std::vector<OutlinePoint> outline(const Camera& camera, const RigidTransform& world_from_model,
+                                    double) const override {
+    const Vector2d c = project(camera, world_from_model.translation_mm);
+    std::vector<OutlinePoint> points;
     const auto add = [&](double u, double v, float normal_u, float normal_v) {
       if (u >= 0 && v >= 0 && u < camera.width_px && v < camera.height_px)
         points.push_back({float(u), float(v), normal_u, normal_v, Eigen::Vector3f::Zero()});
@@ -33,8 +29,8 @@ class SquareProjector : public marrow::OutlineProjector {
 };
 
 /// 200 x 100 pixels of mid grey values, 1 px per mm about the centre at the depth of the world's origin.
-marrow::View view() {
-  marrow::View view;
+View view() {
+  View view;
   view.name = "frontal";
   view.image.pixels = cv::Mat(100, 200, CV_16U, cv::Scalar(1000));
   view.camera.width_px = 200;
@@ -44,28 +40,28 @@ marrow::View view() {
   return view;
 }
 
-marrow::RigidTransform at(double x_mm) {
-  marrow::RigidTransform transform{"world", "ct"};
+RigidTransform at(double x_mm) {
+  RigidTransform transform{"world", "ct"};
   transform.translation_mm.x() = x_mm;
   return transform;
 }
 
-marrow::Pose pose_at(double x_mm) {
-  marrow::Pose pose;
+Pose pose_at(double x_mm) {
+  Pose pose;
   pose.world_from_model = at(x_mm);
   return pose;
 }
 
-const shipped::Options kTripled{{"size_px", std::int64_t{600}}};
+const Options kTripled{{"size_px", std::int64_t{600}}};
 
 /// The picture of a pose; `more` are inputs besides pose, projector and view.
-cv::Mat overlay(const marrow::Pose& pose, const shipped::Inputs& more = {}, const shipped::Options& options = kTripled,
-                const marrow::View& seen = view()) {
-  shipped::Inputs inputs = more;
-  inputs["pose"] = shipped::item(pose);
-  inputs["projector"] = marrow::Value::of<marrow::OutlineProjector>(std::make_shared<const SquareProjector>());
-  inputs["view"] = shipped::item(seen);
-  return shipped::call("render.overlay", inputs, options).at("picture").as<marrow::Picture>().pixels;
+cv::Mat overlay(const Pose& pose, const Inputs& more = {}, const Options& options = kTripled,
+                const View& seen = view()) {
+  Inputs inputs = more;
+  inputs["pose"] = item(pose);
+  inputs["projector"] = Value::of<OutlineProjector>(std::make_shared<const SquareProjector>());
+  inputs["view"] = item(seen);
+  return output<Picture>("render.overlay", "picture", inputs, options).pixels;
 }
 
 /// Pixels of a colour anywhere above the legend.
@@ -79,7 +75,7 @@ bool contains(const cv::Mat& picture, int height, const cv::Scalar& colour) {
 // OpenCV's fonts have only ASCII. The expected replacements of other characters are written by hand.
 TEST(Overlay, WritesNamesWithoutTheirMarks) {
   const auto titled = [](const std::string& name) {
-    marrow::View named = view();
+    View named = view();
     named.name = name;
     return overlay(pose_at(0), {}, kTripled, named);
   };
@@ -114,8 +110,7 @@ TEST(Overlay, OutlinesAreTwoPixelsWide) {
 }
 
 TEST(Overlay, BeforeIsOnTheLeftAndAfterOnTheRight) {
-  const cv::Mat picture =
-      overlay(pose_at(40), {{"start", shipped::item(pose_at(-40))}, {"truth", shipped::item(marrow::Truth{at(10)})}});
+  const cv::Mat picture = overlay(pose_at(40), {{"start", item(pose_at(-40))}, {"truth", item(Truth{at(10)})}});
   EXPECT_EQ(picture.cols, 1200);
   EXPECT_TRUE(has(picture, {241, 151}, kOrange));
   EXPECT_TRUE(has(picture, {391, 151}, kYellow));
@@ -126,11 +121,11 @@ TEST(Overlay, BeforeIsOnTheLeftAndAfterOnTheRight) {
 }
 
 TEST(Overlay, DrawsEdgesAndShaftLines) {
-  const marrow::EdgeMap edges{200, 100, {{150, 70, 1, 0, 1}, {std::nanf(""), 0, 1, 0, 1}}};
-  marrow::ShaftLines lines;
+  const EdgeMap edges{200, 100, {{150, 70, 1, 0, 1}, {std::nanf(""), 0, 1, 0, 1}}};
+  ShaftLines lines;
   lines.left = {{20, 30}, {20, 90}};
   lines.right = {{30, 30}, {30, 90}};
-  const cv::Mat picture = overlay(pose_at(0), {{"edges", shipped::item(edges)}, {"lines", shipped::item(lines)}});
+  const cv::Mat picture = overlay(pose_at(0), {{"edges", item(edges)}, {"lines", item(lines)}});
   EXPECT_TRUE(has(picture, {61, 151}, kGreen));
   EXPECT_TRUE(has(picture, {91, 151}, kGreen));
   EXPECT_TRUE(has(picture, {451, 211}, {170, 111, 64})) << "halfway between grey and the colour of edges";
@@ -143,11 +138,11 @@ TEST(Overlay, SaysWhenTheOutlineIsOutside) {
 }
 
 TEST(Overlay, ZoomShowsTheOutlinesAndAMargin) {
-  shipped::Options options = kTripled;
+  Options options = kTripled;
   options["zoom"] = true;
   const cv::Mat picture = overlay(pose_at(10), {}, options);
   // All pixels differ, so the margin, where nothing is drawn, tells which part of the image is shown.
-  marrow::View varied = view();
+  View varied = view();
   for (int v = 0; v < 100; ++v)
     for (int u = 0; u < 200; ++u) varied.image.pixels.at<std::uint16_t>(v, u) = (7919 * u + 1733 * v) % 4001 + 1000;
   const cv::Mat zoomed = overlay(pose_at(10), {}, options, varied);
@@ -159,7 +154,7 @@ TEST(Overlay, ZoomShowsTheOutlinesAndAMargin) {
 }
 
 TEST(Overlay, ContrastIgnoresNotANumberAndWhatTheMaskHides) {
-  marrow::View grey = view();
+  View grey = view();
   grey.image.pixels = cv::Mat(100, 200, CV_32F, cv::Scalar(10));
   grey.image.pixels.colRange(100, 200).setTo(20);
   grey.image.pixels.at<float>(0, 0) = std::nanf("");
@@ -176,18 +171,18 @@ TEST(Overlay, ContrastIgnoresNotANumberAndWhatTheMaskHides) {
 }
 
 TEST(Overlay, SaysWhatIsWrong) {
-  const auto message = [](const marrow::View& view, const marrow::Pose& pose) {
-    return marrow::test::message_of([&] { overlay(pose, {}, {}, view); });
+  const auto message = [](const View& view, const Pose& pose) {
+    return message_of([&] { overlay(pose, {}, {}, view); });
   };
-  marrow::View empty = view();
+  View empty = view();
   empty.image.pixels = cv::Mat();
   EXPECT_EQ(message(empty, {}), "view 'frontal': the image is empty");
-  marrow::View colour = view();
+  View colour = view();
   colour.image.pixels = cv::Mat(100, 200, CV_8UC3, cv::Scalar::all(0));
   EXPECT_EQ(message(colour, {}), "view 'frontal': the image has 3 channels; an X-ray has one");
-  marrow::Pose pose;
+  Pose pose;
   pose.world_from_model.translation_mm.x() = std::nan("");
   EXPECT_EQ(message(view(), pose), "pose 'result': the transform has a number that is not finite");
 }
 
-}  // namespace overlay_test
+}  // namespace marrow::test::overlay_test

@@ -1,13 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 // What a picture shows: colours of pixels, and texts. A text is compared with the same text drawn by the test.
-#include <cmath>
 #include <opencv2/core.hpp>
-#include <vector>
 
 #include "marrow/toolbox/draw/canvas.hpp"
+#include "tests/harness/node_test.hpp"
 
-namespace pictures {
+namespace marrow::test::pictures {
 
 /// Whether a pixel has about this colour.
 inline bool has(const cv::Mat& picture, cv::Point pixel, const cv::Scalar& colour) {
@@ -21,9 +20,9 @@ inline bool same(const cv::Mat& a, const cv::Mat& b) {
 }
 
 /// Whether the picture has this legend, and nothing else, below its first `height` rows.
-inline bool has_legend(const cv::Mat& picture, int height, const std::vector<marrow::draw::LegendItem>& items) {
-  const cv::Mat expected = marrow::draw::with_legend(cv::Mat(height, picture.cols, CV_8UC3, cv::Scalar()), items);
+inline bool has_legend(const cv::Mat& picture, int height, const std::vector<draw::LegendItem>& items) {
+  const cv::Mat expected = draw::with_legend(cv::Mat(height, picture.cols, CV_8UC3, cv::Scalar()), items);
   return same(expected.rowRange(height, expected.rows), picture.rowRange(height, picture.rows));
 }
 
-}  // namespace pictures
+}  // namespace marrow::test::pictures

@@ -1,15 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <gtest/gtest.h>
+#include "tests/harness/node_test.hpp"
 
-#include "shipped.hpp"
-#include "tests/framework/domain/shapes.hpp"
-#include "tests/harness/message_of.hpp"
-
-namespace scene_test {
+namespace marrow::test::scene_test {
 
 /// 100 x 100 pixels, one pixel per mm at the world's origin, 1000 mm from the source, looking along +z.
-marrow::View view() {
-  marrow::View view;
+View view() {
+  View view;
   view.name = "frontal";
   view.image.pixels = cv::Mat(100, 100, CV_8U, cv::Scalar(77));
   view.camera.width_px = view.camera.height_px = 100;
@@ -18,27 +14,25 @@ marrow::View view() {
   return view;
 }
 
-marrow::Pose at(const Eigen::Vector3d& translation_mm) {
-  marrow::Pose pose;
+Pose at(const Vector3d& translation_mm) {
+  Pose pose;
   pose.world_from_model.translation_mm = translation_mm;
   return pose;
 }
 
-cv::Mat draw(const marrow::List<marrow::Mesh>& meshes, const marrow::List<marrow::Pose>& poses) {
-  return shipped::call("render.scene",
-                       {{"models", shipped::list(meshes, "fragment")},
-                        {"poses", shipped::list(poses, "fragment")},
-                        {"view", shipped::item(view())}},
-                       {{"size_px", std::int64_t{200}}})
-      .at("picture")
-      .as<marrow::Picture>()
+cv::Mat draw(const List<Mesh>& meshes, const List<Pose>& poses) {
+  return output<Picture>("render.scene", "picture",
+                         {{"models", shipped::list(meshes, "fragment")},
+                          {"poses", shipped::list(poses, "fragment")},
+                          {"view", item(view())}},
+                         {{"size_px", std::int64_t{200}}})
       .pixels;
 }
 
-marrow::List<marrow::Mesh> two_boxes() {
-  marrow::List<marrow::Mesh> meshes;
-  meshes.add("proximal", marrow::test::box({0, 0, 0}, {20, 20, 20}));
-  meshes.add("distal", marrow::test::box({0, 0, 0}, {20, 20, 20}));
+List<Mesh> two_boxes() {
+  List<Mesh> meshes;
+  meshes.add("proximal", box({0, 0, 0}, {20, 20, 20}));
+  meshes.add("distal", box({0, 0, 0}, {20, 20, 20}));
   return meshes;
 }
 
@@ -46,7 +40,7 @@ bool reddish(const cv::Vec3b& pixel) { return pixel[0] > pixel[2] + 40; }  // th
 bool bluish(const cv::Vec3b& pixel) { return pixel[2] > pixel[0] + 40; }   // the second model's
 
 TEST(Scene, DrawsEachModelAtItsPlace) {
-  marrow::List<marrow::Pose> poses;
+  List<Pose> poses;
   poses.add("distal", at({30, 0, 0}));  // another order: poses go by name
   poses.add("proximal", at({-30, 0, 0}));
   const cv::Mat picture = draw(two_boxes(), poses);
@@ -59,28 +53,28 @@ TEST(Scene, DrawsEachModelAtItsPlace) {
 }
 
 TEST(Scene, TheNearerModelHidesTheOther) {
-  marrow::List<marrow::Pose> poses;
+  List<Pose> poses;
   poses.add("proximal", at({0, 0, 100}));
   poses.add("distal", at({0, 0, -100}));
   EXPECT_TRUE(bluish(draw(two_boxes(), poses).at<cv::Vec3b>(100, 300)));
-  marrow::List<marrow::Pose> swapped;
+  List<Pose> swapped;
   swapped.add("proximal", at({0, 0, -100}));
   swapped.add("distal", at({0, 0, 100}));
   EXPECT_TRUE(reddish(draw(two_boxes(), swapped).at<cv::Vec3b>(100, 300)));
 }
 
 TEST(Scene, ModelsBehindTheSourceAreNotDrawn) {
-  marrow::List<marrow::Pose> poses;
+  List<Pose> poses;
   poses.add("proximal", at({0, 0, -2000}));
   poses.add("distal", at({0, 0, -1000}));  // around the source
   EXPECT_EQ(draw(two_boxes(), poses).cols, 400);
 }
 
 TEST(Scene, SaysWhichPoseIsMissing) {
-  marrow::List<marrow::Pose> poses;
+  List<Pose> poses;
   poses.add("distal", at({0, 0, 0}));
-  EXPECT_EQ(marrow::test::message_of([&] { draw(two_boxes(), poses); }),
+  EXPECT_EQ(message_of([&] { draw(two_boxes(), poses); }),
             "fragment 'proximal': there is a mesh, but no pose of that name");
 }
 
-}  // namespace scene_test
+}  // namespace marrow::test::scene_test

@@ -1,25 +1,22 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <gtest/gtest.h>
-
 #include "marrow/toolbox/draw/canvas.hpp"
-#include "shipped.hpp"
 #include "tests/plugins/render/pictures.hpp"
 
-namespace shaft_test {
+namespace marrow::test::shaft_test {
 
-using namespace marrow::draw;
+using namespace draw;
 using pictures::has;
 
-marrow::View view() {
-  marrow::View view;
+View view() {
+  View view;
   view.name = "frontal";
   view.image.pixels = cv::Mat(100, 100, CV_8U, cv::Scalar(77));
   view.camera.width_px = view.camera.height_px = 100;
   return view;
 }
 
-marrow::ShaftLines lines() {
-  marrow::ShaftLines lines;
+ShaftLines lines() {
+  ShaftLines lines;
   lines.left = {{30, 10}, {30, 90}};
   lines.right = {{60, 10}, {60, 90}};
   lines.width_mm = 27.3;
@@ -31,13 +28,10 @@ marrow::ShaftLines lines() {
 }
 
 // Pixel u of the image has its centre at 5 u + 2 in a panel of five times the size.
-const shipped::Options kFiveTimes{{"size_px", std::int64_t{500}}};
+const Options kFiveTimes{{"size_px", std::int64_t{500}}};
 
-cv::Mat shaft(const marrow::ShaftLines& lines, const shipped::Options& options = kFiveTimes) {
-  return shipped::call("render.shaft", {{"lines", shipped::item(lines)}, {"view", shipped::item(view())}}, options)
-      .at("picture")
-      .as<marrow::Picture>()
-      .pixels;
+cv::Mat shaft(const ShaftLines& lines, const Options& options = kFiveTimes) {
+  return output<Picture>("render.shaft", "picture", {{"lines", item(lines)}, {"view", item(view())}}, options).pixels;
 }
 
 TEST(RenderShaft, ChosenAndRejectedPairsHaveTheirColours) {
@@ -51,7 +45,7 @@ TEST(RenderShaft, ChosenAndRejectedPairsHaveTheirColours) {
 TEST(RenderShaft, TheLineMidwayIsDrawn) { EXPECT_TRUE(has(shaft(lines()), {227, 250}, kSkyBlue)); }
 
 TEST(RenderShaft, DrawsNoMoreRejectedPairsThanAsked) {
-  shipped::Options options = kFiveTimes;
+  Options options = kFiveTimes;
   options["rejected"] = std::int64_t{1};
   const cv::Mat picture = shaft(lines(), options);
   EXPECT_TRUE(has(picture, {202, 250}, kOrange));
@@ -69,9 +63,9 @@ TEST(RenderShaft, TellsWidthAndScore) {
 }
 
 TEST(RenderShaft, LinesThatAreNotFiniteDrawNothing) {
-  marrow::ShaftLines broken = lines();
+  ShaftLines broken = lines();
   broken.left.from_px.x() = broken.rejected[0].left.from_px.y() = std::nan("");
   EXPECT_FALSE(shaft(broken).empty());
 }
 
-}  // namespace shaft_test
+}  // namespace marrow::test::shaft_test

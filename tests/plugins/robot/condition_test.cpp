@@ -1,21 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 // How well a hexapod's legs hold its platform: the condition of their Jacobian against numpy, and who looks at it.
-#include <gtest/gtest.h>
-
-#include <string>
-#include <vector>
-
 #include "marrow/toolbox/robotics/hexapod.hpp"
-#include "tests/harness/message_of.hpp"
-#include "tests/plugins/simulate/nodes.hpp"
+#include "tests/plugins/simulate/phantoms.hpp"
 
-namespace condition_test {
+namespace marrow::test::condition_test {
 
-using namespace marrow;
 using robot::Hexapod;
 using test::message_of;
 
-RigidTransform pose(const Eigen::Vector3d& rotation_deg, const Eigen::Vector3d& at_mm) {
+RigidTransform pose(const Vector3d& rotation_deg, const Vector3d& at_mm) {
   return {"base", "platform", rotation_from_vector(rotation_deg * kPi / 180), at_mm};
 }
 
@@ -73,12 +66,12 @@ TEST(HexapodCondition, NoPoseIsFoundWhereTheLegsDoNotHoldThePlatform) {
 /// A motion of the platform from home.
 Pose shifted(double up_mm) {
   Pose pose;
-  pose.world_from_model = {"home", "platform", Eigen::Matrix3d::Identity(), {0, 0, up_mm}};
+  pose.world_from_model = {"home", "platform", Matrix3d::Identity(), {0, 0, up_mm}};
   return pose;
 }
 
 /// A shape by the angles between its joints.
-shipped::Options shape(double base_gap_deg) { return {{"base_gap_deg", base_gap_deg}, {"platform_gap_deg", 60.0}}; }
+Options shape(double base_gap_deg) { return {{"base_gap_deg", base_gap_deg}, {"platform_gap_deg", 60.0}}; }
 
 const phantom::Phantom& broken() {
   static const phantom::Phantom made = simulated::fracture(simulated::femur({}), {});
@@ -86,45 +79,41 @@ const phantom::Phantom& broken() {
 }
 
 TEST(HexapodCondition, ASingularHexapodIsRefusedByAllNodes) {
-  const shipped::Inputs phantom{{"phantom", shipped::item(broken())}};
-  EXPECT_EQ(shipped::refusal("robot.hexapod", phantom, shape(60)),
+  const Inputs phantom{{"phantom", item(broken())}};
+  EXPECT_EQ(refusal("robot.hexapod", phantom, shape(60)),
             "robot.hexapod: home: the hexapod's legs do not hold the platform in this pose: the pose is singular, at "
             "most 100 is allowed; give another motion, or another shape of the hexapod");
   List<Pose> commands;
   commands.add("up", shifted(2));
-  EXPECT_EQ(shipped::refusal("simulate.hexapod",
-                             {{"phantom", shipped::item(broken())}, {"commands", shipped::list(commands, "position")}},
-                             shape(60)),
+  EXPECT_EQ(refusal("simulate.hexapod",
+                    {{"phantom", item(broken())}, {"commands", shipped::list(commands, "position")}}, shape(60)),
             "simulate.hexapod: home: the hexapod's legs do not hold the platform in this pose: the pose is singular, "
             "at most 100 is allowed; give another motion, or another shape of the hexapod");
 }
 
 TEST(HexapodCondition, AHexapodNearASingularPoseIsWarnedOf) {
-  std::vector<std::string> warnings;
-  Context::Hooks hooks;
-  hooks.log = [&](std::string_view text, LogLevel level) {
-    if (level == LogLevel::warning) warnings.emplace_back(text);
-  };
+  Heard heard;
   List<Pose> commands;
   commands.add("stays", shifted(0));
-  const auto made = shipped::call(
-      "simulate.hexapod", {{"phantom", shipped::item(broken())}, {"commands", shipped::list(commands, "position")}},
-      shape(54), Context(hooks));
-  EXPECT_EQ(warnings, std::vector<std::string>{
-                          "a motion comes near a singular pose of the hexapod: the condition of its legs is 41, and "
-                          "above 20 an error of a leg moves the platform several times as far as usual"});
-  EXPECT_NEAR(shipped::figure(shipped::item(made.at("legs").as_list<Metrics>()[0]), "condition"), 41.0714576825, 1e-6);
-  warnings.clear();
-  shipped::call("robot.hexapod", {{"phantom", shipped::item(broken())}},
-                {{"base_gap_deg", 54.0},
-                 {"platform_gap_deg", 60.0},
-                 {"base_radius_mm", 150.0},
-                 {"platform_radius_mm", 90.0},
-                 {"height_mm", 220.0}},
-                Context(hooks));
-  ASSERT_EQ(warnings.size(), 1u);
-  EXPECT_TRUE(warnings[0].starts_with("home comes near a singular pose of the hexapod: the condition of its legs is "))
-      << warnings[0];
+  const auto made =
+      call("simulate.hexapod", {{"phantom", item(broken())}, {"commands", shipped::list(commands, "position")}},
+           shape(54), heard.context);
+  EXPECT_EQ(heard.warnings,
+            Strings{"a motion comes near a singular pose of the hexapod: the condition of its legs is 41, and "
+                    "above 20 an error of a leg moves the platform several times as far as usual"});
+  EXPECT_NEAR(figure(item(made.at("legs").as_list<Metrics>()[0]), "condition"), 41.0714576825, 1e-6);
+  heard.warnings.clear();
+  call("robot.hexapod", {{"phantom", item(broken())}},
+       {{"base_gap_deg", 54.0},
+        {"platform_gap_deg", 60.0},
+        {"base_radius_mm", 150.0},
+        {"platform_radius_mm", 90.0},
+        {"height_mm", 220.0}},
+       heard.context);
+  ASSERT_EQ(heard.warnings.size(), 1u);
+  EXPECT_TRUE(
+      heard.warnings[0].starts_with("home comes near a singular pose of the hexapod: the condition of its legs is "))
+      << heard.warnings[0];
 }
 
-}  // namespace condition_test
+}  // namespace marrow::test::condition_test

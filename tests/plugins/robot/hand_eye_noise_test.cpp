@@ -1,21 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 // How well a robot's place is known from noisy stations: turns about one axis, and the predicted deviations against
 // those of drawn stations whose right answer is known.
-#include <gtest/gtest.h>
-
-#include <cmath>
-#include <limits>
-#include <string>
-#include <vector>
-
 #include "marrow/domain/decompositions.hpp"
 #include "marrow/domain/random.hpp"
 #include "marrow/toolbox/robotics/hand_eye.hpp"
-#include "tests/harness/message_of.hpp"
+#include "tests/harness/node_test.hpp"
 
-namespace hand_eye_noise_test {
+namespace marrow::test::hand_eye_noise_test {
 
-using namespace marrow;
 using robot::Move;
 using robot::Station;
 using test::message_of;
@@ -24,18 +16,17 @@ const RigidTransform kHand{"hand", "target", rotation_from_vector({0.3, 2.5, -1}
 const RigidTransform kBase{"base", "world", rotation_from_vector({-2, 0.2, 1}), {400, -100, 80}};
 /// The move that is wanted, and where it leads the fragment's middle.
 const RigidTransform kMotion{"world", "world", rotation_from_vector({0.2, -0.1, 0.3}), {12, -20, 25}};
-const Eigen::Vector3d kPlace(20, -30, 100);
+const Vector3d kPlace(20, -30, 100);
 
-Eigen::Vector3d drawn(Random& random, double deviation) {
+Vector3d drawn(Random& random, double deviation) {
   const double x = random.normal(), y = random.normal(), z = random.normal();
-  return deviation * Eigen::Vector3d(x, y, z);
+  return deviation * Vector3d(x, y, z);
 }
 
 /// The hand turned like this; the target near the world's origin is seen with noise.
-Station station(const Eigen::Vector3d& turn_deg, const Eigen::Vector3d& shift_mm, double noise_deg, double noise_mm,
-                Random& random) {
+Station station(const Vector3d& turn_deg, const Vector3d& shift_mm, double noise_deg, double noise_mm, Random& random) {
   // The hand's middle is where the target lies in the middle of the world.
-  RigidTransform hand{"base", "hand", rotation_from_vector(radians(1) * turn_deg), Eigen::Vector3d::Zero()};
+  RigidTransform hand{"base", "hand", rotation_from_vector(radians(1) * turn_deg), Vector3d::Zero()};
   hand.translation_mm = kBase.translation_mm + shift_mm - hand.rotation * kHand.translation_mm;
   Station made;
   made.base_from_hand = hand;
@@ -51,8 +42,7 @@ std::vector<Move> moves_between(const std::vector<Station>& stations) {
   for (std::size_t i = 0; i < stations.size(); ++i)
     for (std::size_t j = i + 1; j < stations.size(); ++j)
       moves.push_back({stations[j].base_from_hand * inverse(stations[i].base_from_hand),
-                       stations[j].world_from_target * inverse(stations[i].world_from_target),
-                       Eigen::Vector3d::Zero()});
+                       stations[j].world_from_target * inverse(stations[i].world_from_target), Vector3d::Zero()});
   return moves;
 }
 
@@ -107,7 +97,7 @@ std::vector<Station> about_one_axis(double noise_deg, double noise_mm, std::uint
   std::vector<Station> stations;
   for (const double turn_deg : {0.0, 12.0, 0.0, -12.0, 6.0, -6.0}) {
     // The hand's encoders err, too.
-    const Eigen::Vector3d hand_deg = Eigen::Vector3d(turn_deg, 0, 0) + drawn(random, 0.2 * noise_deg);
+    const Vector3d hand_deg = Vector3d(turn_deg, 0, 0) + drawn(random, 0.2 * noise_deg);
     stations.push_back(station(hand_deg, {0, 0, 0}, noise_deg, noise_mm, random));
   }
   return stations;
@@ -153,8 +143,7 @@ TEST(HandEyeNoise, TurnsCountByTheirSize) {
   const auto stations = [](double turn_deg) {
     Random random(3);
     std::vector<Station> made;
-    for (const Eigen::Vector3d& axis :
-         {Eigen::Vector3d(0, 0, 0), Eigen::Vector3d(1, 0, 0), Eigen::Vector3d(0, 1, 0), Eigen::Vector3d(0, 0, 1)})
+    for (const Vector3d& axis : {Vector3d(0, 0, 0), Vector3d(1, 0, 0), Vector3d(0, 1, 0), Vector3d(0, 0, 1)})
       made.push_back(station(turn_deg * axis, {0, 0, 0}, 0.1, 0.1, random));
     return made;
   };
@@ -175,7 +164,7 @@ TEST(HandEyeNoise, ManyMovesAboutOneAxisLeaveTheTurnAboutItToTheGuess) {
     move.seen = inverse(right) * move.told * right;
     move.seen.rotation = rotation_from_vector(drawn(random, radians(0.15))) * move.seen.rotation;
     move.seen.translation_mm += drawn(random, 0.15);
-    move.centre_mm = inverse(right) * Eigen::Vector3d(20, 0, 0);  // on the axis, so that its shifts tell nothing either
+    move.centre_mm = inverse(right) * Vector3d(20, 0, 0);  // on the axis, so that its shifts tell nothing either
     moves.push_back(move);
   }
   const robot::HandEye found = robot::estimate_hand_eye(moves, right, {});
@@ -183,4 +172,4 @@ TEST(HandEyeNoise, ManyMovesAboutOneAxisLeaveTheTurnAboutItToTheGuess) {
   EXPECT_GT(degrees(std::sqrt(worst)), 60);
 }
 
-}  // namespace hand_eye_noise_test
+}  // namespace marrow::test::hand_eye_noise_test

@@ -1,22 +1,19 @@
 // SPDX-License-Identifier: Apache-2.0
 // Hand-eye calibration against motions that are made with a known transform.
-#include <gtest/gtest.h>
-
+#include "marrow/toolbox/robotics/hand_eye.hpp"
 #include "marrow/domain/random.hpp"
 #include "marrow/guide/servo.hpp"
-#include "marrow/toolbox/robotics/hand_eye.hpp"
-#include "tests/harness/message_of.hpp"
+#include "tests/harness/node_test.hpp"
 
-namespace hand_eye_test {
+namespace marrow::test::hand_eye_test {
 
-using namespace marrow;
 using robot::Move;
 using test::message_of;
 
 const RigidTransform kTrue{"robot", "reference", rotation_from_vector({1.1, -2, 0.7}), {120, -40, 300}};
-const Eigen::Vector3d kCentre(5, -8, 90);
+const Vector3d kCentre(5, -8, 90);
 
-Vector6d motion(Eigen::Vector3d turn_deg, Eigen::Vector3d shift_mm) {
+Vector6d motion(Vector3d turn_deg, Vector3d shift_mm) {
   Vector6d result;
   result << turn_deg * radians(1), shift_mm;
   return result;
@@ -30,10 +27,10 @@ Move move(const Vector6d& step) {
 const std::vector<Move> kMoves{move(motion({8, 0, 0}, {5, 2, 0})), move(motion({0, 7, 2}, {0, -4, 6})),
                                move(motion({1, -2, 6}, {8, 0, -3}))};
 
-double turn_deg(const RigidTransform& found) { return degrees(geodesic_angle_rad(found.rotation, kTrue.rotation)); }
+double turn_deg(const RigidTransform& found) { return turn_between_deg(found, kTrue); }
 double shift_mm(const RigidTransform& found) { return (found * kCentre - kTrue * kCentre).norm(); }
 
-RigidTransform far_guess() { return {"robot", "reference", Eigen::Matrix3d::Identity(), {100, -20, 260}}; }
+RigidTransform far_guess() { return {"robot", "reference", Matrix3d::Identity(), {100, -20, 260}}; }
 
 TEST(HandEye, TwoMovesDetermineItFromAnyGuess) {
   const auto found =
@@ -52,8 +49,8 @@ TEST(HandEye, WithoutAMoveItIsTheGuessWithItsDeviations) {
 TEST(HandEye, OneMoveLeavesTheTurnAboutItsAxisToTheGuess) {
   const robot::HandEye found =
       robot::estimate_hand_eye({move(motion({8, 0, 0}, {0, 0, 0}))}, far_guess(), {0.1, 0.1, 0, 60, 50});
-  const Eigen::Vector3d axis = found.robot_from_reference.rotation * Eigen::Vector3d::UnitX();
-  EXPECT_LT(degrees(std::acos(std::min(1.0, axis.dot(kTrue.rotation * Eigen::Vector3d::UnitX())))), 2);
+  const Vector3d axis = found.robot_from_reference.rotation * Vector3d::UnitX();
+  EXPECT_LT(degrees(std::acos(std::min(1.0, axis.dot(kTrue.rotation * Vector3d::UnitX())))), 2);
   EXPECT_GT(degrees(std::sqrt(found.covariance(0, 0))), 40);
   EXPECT_LT(degrees(std::sqrt(found.covariance(1, 1))), 3);
 }
@@ -90,7 +87,7 @@ std::vector<robot::Station> stations(const RigidTransform& hand_from_target, con
   Random random(3);
   const auto vector = [&](double sd) {
     const double x = random.normal(), y = random.normal(), z = random.normal();
-    return Eigen::Vector3d(sd * Eigen::Vector3d(x, y, z));
+    return Vector3d(sd * Vector3d(x, y, z));
   };
   std::vector<robot::Station> all;
   for (int i = 0; i < count; ++i) {
@@ -111,16 +108,16 @@ const RigidTransform kBase{"base", "world", rotation_from_vector({-2, 0.2, 1}), 
 
 TEST(HandEye, AxZbFindsBothTransforms) {
   const robot::RobotWorld found = robot::solve_ax_zb(stations(kHand, kBase, 0));
-  EXPECT_LT(degrees(geodesic_angle_rad(found.hand_from_target.rotation, kHand.rotation)), 1e-5);
-  EXPECT_LT((found.hand_from_target.translation_mm - kHand.translation_mm).norm(), 1e-5);
-  EXPECT_LT(degrees(geodesic_angle_rad(found.base_from_world.rotation, kBase.rotation)), 1e-5);
-  EXPECT_LT((found.base_from_world.translation_mm - kBase.translation_mm).norm(), 1e-5);
+  EXPECT_LT(turn_between_deg(found.hand_from_target, kHand), 1e-5);
+  EXPECT_LT(shift_between_mm(found.hand_from_target, kHand), 1e-5);
+  EXPECT_LT(turn_between_deg(found.base_from_world, kBase), 1e-5);
+  EXPECT_LT(shift_between_mm(found.base_from_world, kBase), 1e-5);
 }
 
 TEST(HandEye, AxZbAveragesNoise) {
   const robot::RobotWorld found = robot::solve_ax_zb(stations(kHand, kBase, 0.1, 12));
-  EXPECT_LT(degrees(geodesic_angle_rad(found.base_from_world.rotation, kBase.rotation)), 0.2);
-  EXPECT_LT((found.base_from_world.translation_mm - kBase.translation_mm).norm(), 1);
+  EXPECT_LT(turn_between_deg(found.base_from_world, kBase), 0.2);
+  EXPECT_LT(shift_between_mm(found.base_from_world, kBase), 1);
 }
 
 TEST(HandEye, AxZbSaysWhatIsMissing) {
@@ -134,4 +131,4 @@ TEST(HandEye, AxZbSaysWhatIsMissing) {
             "further, about axes that are at least 30 degrees apart");
 }
 
-}  // namespace hand_eye_test
+}  // namespace marrow::test::hand_eye_test

@@ -1,21 +1,18 @@
 // SPDX-License-Identifier: Apache-2.0
 // The kinematics of a hexapod against lengths computed by hand, and against each other.
-#include <gtest/gtest.h>
-
-#include "marrow/domain/random.hpp"
 #include "marrow/toolbox/robotics/hexapod.hpp"
-#include "tests/harness/message_of.hpp"
+#include "marrow/domain/random.hpp"
+#include "tests/harness/node_test.hpp"
 
-namespace hexapod_test {
+namespace marrow::test::hexapod_test {
 
-using namespace marrow;
 using robot::Hexapod;
 using test::message_of;
 
 /// Legs in pairs from one joint at 0, 120 and 240 degrees to joints at 60, 180 and 300 degrees.
 Hexapod simple() { return robot::make_hexapod({300, 100, 0, 0, 400}); }
 
-RigidTransform pose(const Eigen::Vector3d& rotation_deg, const Eigen::Vector3d& at_mm) {
+RigidTransform pose(const Vector3d& rotation_deg, const Vector3d& at_mm) {
   return {"base", "platform", rotation_from_vector(rotation_deg * kPi / 180), at_mm};
 }
 
@@ -41,7 +38,7 @@ TEST(Hexapod, ALegTurnsInItsJoints) {
   // One leg straight up of 100 mm: a shift of 100 mm turns it by 45 degrees in both joints. A turn of the platform by
   // 10 degrees about that joint leaves the leg where it is, and turns it in the platform's joint only.
   Hexapod hexapod;
-  for (std::size_t i = 0; i < 6; ++i) hexapod.base_mm[i] = hexapod.platform_mm[i] = Eigen::Vector3d::Zero();
+  for (std::size_t i = 0; i < 6; ++i) hexapod.base_mm[i] = hexapod.platform_mm[i] = Vector3d::Zero();
   hexapod.base_from_home.translation_mm.z() = 100;
   EXPECT_NEAR(degrees(robot::joint_angles_rad(hexapod, pose({0, 0, 0}, {100, 0, 100}))[3]), 45, 1e-9);
   EXPECT_NEAR(degrees(robot::joint_angles_rad(hexapod, pose({10, 0, 0}, {0, 0, 100}))[3]), 10, 1e-9);
@@ -57,7 +54,7 @@ TEST(Hexapod, FourStepsLeadFromHomeToAnyPose) {
         pose({within(15), within(15), within(15)}, {within(15), within(15), 220 + within(15)});
     const auto found = robot::pose_of_legs(hexapod, robot::leg_lengths_mm(hexapod, wanted), hexapod.base_from_home);
     EXPECT_LT(geodesic_angle_rad(found.base_from_platform.rotation, wanted.rotation), 1e-9);
-    EXPECT_LT((found.base_from_platform.translation_mm - wanted.translation_mm).norm(), 1e-7);
+    EXPECT_LT(shift_between_mm(found.base_from_platform, wanted), 1e-7);
     most_steps = std::max(most_steps, found.steps);
   }
   EXPECT_GE(most_steps, 4);
@@ -125,4 +122,4 @@ TEST(Hexapod, SmallErrorsOfLegsBecomeSmallErrorsOfThePose) {
   EXPECT_LT(std::sqrt(shift2 / kRuns), 0.06);
 }
 
-}  // namespace hexapod_test
+}  // namespace marrow::test::hexapod_test

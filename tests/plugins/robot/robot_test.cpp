@@ -1,16 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 // A simulated robot that holds the distal fragment of a fractured femur.
-#include <gtest/gtest.h>
-
 #include "marrow/guide/relative_pose.hpp"
 #include "marrow/robot/contact.hpp"
 #include "marrow/toolbox/robotics/robot_state.hpp"
-#include "tests/harness/message_of.hpp"
-#include "tests/plugins/simulate/nodes.hpp"
+#include "tests/plugins/simulate/phantoms.hpp"
 
-namespace robot_test {
+namespace marrow::test::robot_test {
 
-using namespace marrow;
 using phantom::Phantom;
 using robot::RobotReport;
 using robot::RobotState;
@@ -20,29 +16,26 @@ const phantom::Bone& femur() {
   return made;
 }
 
-Phantom broken(std::vector<double> rotation_deg, std::vector<double> translation_mm) {
+Phantom broken(Numbers rotation_deg, Numbers translation_mm) {
   return simulated::fracture(femur(), {{"rotation_deg", rotation_deg}, {"translation_mm", translation_mm}});
 }
 
-const shipped::Options kExact{
-    {"leg_sd_mm", 0.0}, {"joint_sd_mm", 0.0}, {"give_mm_per_n", 0.0}, {"give_deg_per_nm", 0.0}};
+const Options kExact{{"leg_sd_mm", 0.0}, {"joint_sd_mm", 0.0}, {"give_mm_per_n", 0.0}, {"give_deg_per_nm", 0.0}};
 
-shipped::Outputs gripped(const Phantom& phantom, shipped::Options options = kExact) {
-  return shipped::call("robot.hexapod", {{"phantom", shipped::item(phantom)}}, options);
+Outputs gripped(const Phantom& phantom, Options options = kExact) {
+  return call("robot.hexapod", {{"phantom", item(phantom)}}, options);
 }
 
-shipped::Outputs move(const Phantom& phantom, const shipped::Outputs& before, const RigidTransform& motion) {
+Outputs move(const Phantom& phantom, const Outputs& before, const RigidTransform& motion) {
   Pose told;
   told.world_from_model = motion;
-  return shipped::call("robot.move", {{"phantom", shipped::item(phantom)},
-                                      {"state", before.at("state")},
-                                      {"motion", shipped::item(told)},
-                                      {"report", before.at("report")}});
+  return call("robot.move", {{"phantom", item(phantom)},
+                             {"state", before.at("state")},
+                             {"motion", item(told)},
+                             {"report", before.at("report")}});
 }
 
-RigidTransform shift(double x, double y, double z) {
-  return {"robot", "robot", Eigen::Matrix3d::Identity(), {x, y, z}};
-}
+RigidTransform shift(double x, double y, double z) { return {"robot", "robot", Matrix3d::Identity(), {x, y, z}}; }
 
 TEST(Contact, WholeBoneIsApartAndPressedBoneIsNot) {
   const robot::Contact contact(broken({0, 0, 0}, {0, 0, 0}), "test");
@@ -57,7 +50,7 @@ TEST(Contact, WholeBoneIsApartAndPressedBoneIsNot) {
 }
 
 TEST(Contact, NeedsAFracture) {
-  EXPECT_EQ(marrow::test::message_of([&] { robot::Contact(Phantom{}, "test"); }),
+  EXPECT_EQ(message_of([&] { robot::Contact(Phantom{}, "test"); }),
             "test: the phantom is of a whole bone; a broken one is needed");
 }
 
@@ -74,35 +67,34 @@ TEST(SoftTissue, PullsAsMuchAsItShould) {
 
 TEST(Robot, DoesWhatItIsToldInItsOwnAxes) {
   const Phantom phantom = broken({0, 0, 0}, {5, 0, -8});
-  shipped::Options options = kExact;
-  options["stand_off_deg"] = std::vector<double>{0, 0, 90};
-  options["stand_off_mm"] = std::vector<double>{0, 0, 0};
-  const shipped::Outputs before = gripped(phantom, options), after = move(phantom, before, shift(3, 0, 0));
+  Options options = kExact;
+  options["stand_off_deg"] = Numbers{0, 0, 90};
+  options["stand_off_mm"] = Numbers{0, 0, 0};
+  const Outputs before = gripped(phantom, options), after = move(phantom, before, shift(3, 0, 0));
   const RigidTransform from = before.at("state").as<RobotState>().world_from_ct,
                        to = after.at("state").as<RobotState>().world_from_ct;
   // Its x axis is the world's y axis, turned against it.
-  EXPECT_LT((to.translation_mm - from.translation_mm - Eigen::Vector3d(0, -3, 0)).norm(), 1e-6);
-  EXPECT_LT((after.at("report").as<RobotReport>().done.translation_mm - Eigen::Vector3d(3, 0, 0)).norm(), 1e-9);
-  const Phantom now = shipped::call("robot.scene", {{"phantom", shipped::item(phantom)}, {"state", after.at("state")}})
-                          .at("phantom")
-                          .as<Phantom>();
+  EXPECT_LT((to.translation_mm - from.translation_mm - Vector3d(0, -3, 0)).norm(), 1e-6);
+  EXPECT_LT((after.at("report").as<RobotReport>().done.translation_mm - Vector3d(3, 0, 0)).norm(), 1e-9);
+  const Phantom now =
+      output<Phantom>("robot.scene", "phantom", {{"phantom", item(phantom)}, {"state", after.at("state")}});
   EXPECT_EQ(phantom::fragment_named(now, "distal", "test").world_from_ct.translation_mm, to.translation_mm);
 }
 
 TEST(Robot, GoesOnFromWhereItIsWhateverThePhantomShows) {
   const Phantom phantom = broken({0, 0, 0}, {5, 0, -8});
-  const shipped::Outputs once = move(phantom, gripped(phantom), shift(3, -2, -4));
+  const Outputs once = move(phantom, gripped(phantom), shift(3, -2, -4));
   const RigidTransform there = once.at("state").as<RobotState>().world_from_ct;
   // No motion, with the phantom from before the first one.
-  const shipped::Outputs again = move(phantom, once, shift(0, 0, 0));
+  const Outputs again = move(phantom, once, shift(0, 0, 0));
   EXPECT_EQ(again.at("state").as<RobotState>().world_from_ct.translation_mm, there.translation_mm);
   EXPECT_EQ(again.at("report").as<RobotReport>().load.force_n, once.at("report").as<RobotReport>().load.force_n);
 }
 
 TEST(Robot, YieldsAndErrs) {
   const Phantom phantom = broken({0, 0, 0}, {5, 0, -4});
-  const shipped::Outputs exact = gripped(phantom), real = gripped(phantom, {});
-  const auto moved = [&](const shipped::Outputs& before) {
+  const Outputs exact = gripped(phantom), real = gripped(phantom, {});
+  const auto moved = [&](const Outputs& before) {
     return RigidTransform(move(phantom, before, shift(0, 0, -8)).at("state").as<RobotState>().world_from_ct);
   };
   const double apart = (moved(exact).translation_mm - moved(real).translation_mm).norm();
@@ -112,21 +104,21 @@ TEST(Robot, YieldsAndErrs) {
 
 TEST(Robot, StopsBeforeTheForceThatIsTooLarge) {
   const Phantom phantom = broken({0, 0, 0}, {0, 0, -8});
-  shipped::Options options = kExact;
-  options["stand_off_deg"] = options["stand_off_mm"] = std::vector<double>{0, 0, 0};
-  const shipped::Outputs after = move(phantom, gripped(phantom, options), shift(0, 0, 30));
+  Options options = kExact;
+  options["stand_off_deg"] = options["stand_off_mm"] = Numbers{0, 0, 0};
+  const Outputs after = move(phantom, gripped(phantom, options), shift(0, 0, 30));
   const RobotReport report = after.at("report").as<RobotReport>();
   EXPECT_EQ(report.stopped, "the force would pass 400 N");
   EXPECT_TRUE(report.is_pressed);
   EXPECT_LE(report.largest_load.force_n, 400);
   EXPECT_LT(report.done.translation_mm.z(), 29);
   EXPECT_GT(report.done.translation_mm.z(), 2);
-  EXPECT_EQ(shipped::figure(after.at("metrics"), "stopped"), 1);
+  EXPECT_EQ(figure(after.at("metrics"), "stopped"), 1);
 }
 
 TEST(Robot, StopsAtItsWorkspace) {
   const Phantom phantom = broken({0, 0, 0}, {0, 0, -8});
-  shipped::Options options = kExact;
+  Options options = kExact;
   options["stroke_mm"] = 3.0;
   const RobotReport report = move(phantom, gripped(phantom, options), shift(12, 0, 0)).at("report").as<RobotReport>();
   EXPECT_TRUE(report.stopped.starts_with("the motion is outside the hexapod's workspace: leg ")) << report.stopped;
@@ -135,26 +127,25 @@ TEST(Robot, StopsAtItsWorkspace) {
 
 TEST(Robot, WarnsOfALargeLoad) {
   const Phantom phantom = broken({0, 0, 0}, {0, 0, -10});
-  shipped::Options options = kExact;
-  options["stand_off_deg"] = options["stand_off_mm"] = std::vector<double>{0, 0, 0};
+  Options options = kExact;
+  options["stand_off_deg"] = options["stand_off_mm"] = Numbers{0, 0, 0};
   EXPECT_FALSE(move(phantom, gripped(phantom, options), shift(0, 0, 2)).at("report").as<RobotReport>().is_warning);
   EXPECT_TRUE(move(phantom, gripped(phantom, options), shift(0, 0, -8)).at("report").as<RobotReport>().is_warning);
 }
 
 TEST(Robot, RefusesWhatItCannotGrip) {
-  const std::string text =
-      shipped::refusal("robot.hexapod", {{"phantom", shipped::item(broken({0, 0, 0}, {0, 0, 12}))}});
+  const std::string text = refusal("robot.hexapod", {{"phantom", item(broken({0, 0, 0}, {0, 0, 12}))}});
   EXPECT_TRUE(text.starts_with("robot.hexapod: the force on the fragment is already ")) << text;
   EXPECT_TRUE(
       text.ends_with("its limit is 400 N; does its bone stick in the other fragment? Begin with the fragments apart"))
       << text;
   EXPECT_EQ(
-      shipped::refusal("robot.hexapod", {{"phantom", shipped::item(broken({0, 0, 0}, {0, 0, -5}))}},
-                       {{"moved", "proximal"}, {"reference", "distal"}}),
+      refusal("robot.hexapod", {{"phantom", item(broken({0, 0, 0}, {0, 0, -5}))}},
+              {{"moved", "proximal"}, {"reference", "distal"}}),
       "robot.hexapod: the robot holds the distal fragment, and the proximal one stays; got 'proximal' and 'distal'");
   Phantom whole = broken({0, 0, 0}, {0, 0, -5});
   whole.fracture = {};
-  EXPECT_EQ(shipped::refusal("robot.hexapod", {{"phantom", shipped::item(whole)}}),
+  EXPECT_EQ(refusal("robot.hexapod", {{"phantom", item(whole)}}),
             "robot.hexapod: fragment 'proximal' lies on one side of a fracture, but there is no fracture surface");
 }
 
@@ -162,7 +153,7 @@ TEST(RelativePose, ItsDeviationCountsBothPosesAndTheLever) {
   Pose distal, proximal;
   distal.frame.origin_mm = {0, 0, -100};
   proximal.frame.origin_mm = {0, 0, 100};
-  distal.frame.axes = proximal.frame.axes = Eigen::Matrix3d::Identity();
+  distal.frame.axes = proximal.frame.axes = Matrix3d::Identity();
   distal.covariance = Matrix6d::Zero();
   Matrix6d of_proximal = Matrix6d::Zero();
   of_proximal(0, 0) = 1e-6;  // 1 mrad about x, 200 mm away
@@ -174,4 +165,4 @@ TEST(RelativePose, ItsDeviationCountsBothPosesAndTheLever) {
   EXPECT_TRUE(std::isinf(guide::shift_deviation_mm(guide::relative_pose(distal, proximal).covariance)));
 }
 
-}  // namespace robot_test
+}  // namespace marrow::test::robot_test

@@ -1,30 +1,28 @@
 // SPDX-License-Identifier: Apache-2.0
 // The laws of the loop, closed around a fragment whose pose is measured with noise, without images.
-#include <gtest/gtest.h>
-
-#include "marrow/domain/random.hpp"
 #include "marrow/guide/servo.hpp"
+#include "marrow/domain/random.hpp"
+#include "tests/harness/node_test.hpp"
 
-namespace servo_test {
+namespace marrow::test::servo_test {
 
-using namespace marrow;
 using robot::Move;
 
 enum class Law { fixed, broyden, estimated };
 
-Eigen::Vector3d direction(Random& random) {
+Vector3d direction(Random& random) {
   const double x = random.normal(), y = random.normal(), z = random.normal();
-  return Eigen::Vector3d(x, y, z).normalized();
+  return Vector3d(x, y, z).normalized();
 }
 
 /// Pairs of images until the fragment is within 1 degree and 1 mm; 41 if 40 are not enough.
 int pairs_of(Law law, double phi_deg, double damping, std::uint64_t seed) {
   Random random(seed);
-  const Eigen::Vector3d centre(0, 0, 100);
-  const RigidTransform guess{"robot", "reference", Eigen::Matrix3d::Identity(), Eigen::Vector3d::Zero()};
+  const Vector3d centre(0, 0, 100);
+  const RigidTransform guess{"robot", "reference", Matrix3d::Identity(), Vector3d::Zero()};
   Vector6d off;
   off << radians(phi_deg) * direction(random), 50 * direction(random);
-  const RigidTransform right = moved(guess, {centre, Eigen::Matrix3d::Identity()}, off);
+  const RigidTransform right = moved(guess, {centre, Matrix3d::Identity()}, off);
   RigidTransform pose{"reference", "fragment"};
   Vector6d start;
   start << radians(5 + 15 * random.uniform()) * direction(random), 17 * direction(random);
@@ -39,12 +37,12 @@ int pairs_of(Law law, double phi_deg, double damping, std::uint64_t seed) {
     Vector6d noise;
     for (int k = 0; k < 6; ++k) noise[k] = random.normal() * (k < 3 ? radians(0.1) : 0.06);
     const RigidTransform seen = guide::motion_of(noise, pose * centre) * pose;
-    const Eigen::Vector3d middle = seen * centre;
+    const Vector3d middle = seen * centre;
     Vector6d error;
     error << vector_from_rotation(seen.rotation), middle - centre;
     if (pair > 1) {
       const RigidTransform happened = seen * inverse(seen_before);
-      const Eigen::Vector3d from = seen_before * centre;
+      const Vector3d from = seen_before * centre;
       moves.push_back({told, happened, from});
       if (law == Law::estimated) x = robot::estimate_hand_eye(moves, guess, {}).robot_from_reference;
       if (law == Law::broyden)
@@ -120,9 +118,9 @@ TEST(Servo, AStepIsShortenedAsAWholeUntilItPassesNoLimit) {
 TEST(Servo, AMotionAboutThePointAndBack) {
   Vector6d step;
   step << 0.1, -0.2, 0.3, 4, 5, 6;
-  const Eigen::Vector3d centre(10, 20, 30);
+  const Vector3d centre(10, 20, 30);
   const RigidTransform motion = guide::motion_of(step, centre);
-  EXPECT_LT((motion * centre - centre - Eigen::Vector3d(4, 5, 6)).norm(), 1e-9);
+  EXPECT_LT((motion * centre - centre - Vector3d(4, 5, 6)).norm(), 1e-9);
   EXPECT_LT((guide::step_of(motion, centre) - step).norm(), 1e-9);
 }
 
@@ -140,4 +138,4 @@ TEST(Servo, BroydensJacobianExplainsTheLastMotion) {
   EXPECT_LT(guide::ask_for(Matrix6d::Zero(), seen).norm(), 1e-12);
 }
 
-}  // namespace servo_test
+}  // namespace marrow::test::servo_test

@@ -1,31 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <gtest/gtest.h>
-
-#include <Eigen/Geometry>
-#include <algorithm>
-#include <array>
-#include <cmath>
-
-#include "marrow/domain/mesh.hpp"
 #include "tests/plugins/segment/broken_tube.hpp"
 #include "tests/plugins/segment/segmented.hpp"
 
-namespace atlas_test {
-
-using Eigen::Vector3d;
-using marrow::List;
-using marrow::Mesh;
-using marrow::Seeds;
-using marrow::Volume;
+namespace marrow::test::atlas_test {
 
 /// A bone with ends that are not round, so that it lies one way only, in two fragments of a known displacement.
 struct Bone {
   double gap_mm = 0, turned_deg = 0, aside_mm = 0;
 
   static double whole(const Vector3d& p) {
-    const double shaft = phantom::round_cone(p, {0, 0, -25}, {0, 0, 25}, 8, 7),
-                 head = phantom::round_cone(p, {0, 0, 25}, {8, 0, 30}, 9, 7);
-    const double foot = phantom::round_cone(p, {-5, -4, -25}, {6, 2, -27}, 9, 9);
+    const double shaft = bones::round_cone(p, {0, 0, -25}, {0, 0, 25}, 8, 7),
+                 head = bones::round_cone(p, {0, 0, 25}, {8, 0, 30}, 9, 7);
+    const double foot = bones::round_cone(p, {-5, -4, -25}, {6, 2, -27}, 9, 9);
     return std::min({shaft, head, foot});
   }
   Vector3d in_distal(const Vector3d& p) const {
@@ -40,10 +26,10 @@ struct Bone {
     return std::max(whole(q), q.z() + 0.5 * gap_mm);
   }
   Volume volume() const {
-    return phantom::scan(
-        phantom::ct_grid({52, 60, 96}),
+    return bones::scan(
+        bones::ct_grid({52, 60, 96}),
         [&](const Vector3d& p) {
-          return 50 + 900 * std::min(1.0, phantom::filled(distance(p, 0)) + phantom::filled(distance(p, 1)));
+          return 50 + 900 * std::min(1.0, bones::filled(distance(p, 0)) + bones::filled(distance(p, 1)));
         },
         0.5, 30, 9);
   }
@@ -91,24 +77,22 @@ Mesh template_mesh(double scale, const Vector3d& shift) {
   return mesh;
 }
 
-shipped::Inputs inputs(const Bone& bone, const Mesh& whole) {
-  shipped::Inputs inputs = segmented::inputs(bone.volume(), bone.seeds());
-  inputs["template"] = shipped::item(whole);
+Inputs inputs(const Bone& bone, const Mesh& whole) {
+  Inputs inputs = segmented::inputs(bone.volume(), bone.seeds());
+  inputs["template"] = item(whole);
   return inputs;
 }
 
-std::array<phantom::Accuracy, 2> accuracy_of(const Bone& bone) {
-  const auto fields = shipped::call("segment.atlas", inputs(bone, template_mesh(1.15, {30, -20, 12})))
-                          .at("field")
-                          .as_list<marrow::SignedField>();
+std::array<bones::Accuracy, 2> accuracy_of(const Bone& bone) {
+  const auto fields =
+      output_list<SignedField>("segment.atlas", "field", inputs(bone, template_mesh(1.15, {30, -20, 12})));
   EXPECT_EQ(fields.size(), 2u);
-  EXPECT_EQ(phantom::overlap(fields), 0u);
-  std::array<phantom::Accuracy, 2> accuracies;
+  EXPECT_EQ(bones::overlap(fields), 0u);
+  std::array<bones::Accuracy, 2> accuracies;
   for (std::size_t f = 0; f < 2; ++f) {
-    accuracies[f] = phantom::compare(
+    accuracies[f] = bones::compare(
         fields[f], [&](const Vector3d& p) { return bone.distance(p, f); },
         [&](const Vector3d& p) { return std::abs(p.z()) > 6; });
-    phantom::print(fields.name(f), accuracies[f]);
   }
   return accuracies;
 }
@@ -131,8 +115,8 @@ TEST(Atlas, FailsOnADisplacedFracture) {
 TEST(Atlas, WantsAClosedTemplate) {
   Mesh open = template_mesh(1, Vector3d::Zero());
   open.triangles.pop_back();
-  EXPECT_EQ(shipped::refusal("segment.atlas", inputs({}, open)),
+  EXPECT_EQ(refusal("segment.atlas", inputs({}, open)),
             "template: a closed surface expected, got one with holes; its inside is not defined");
 }
 
-}  // namespace atlas_test
+}  // namespace marrow::test::atlas_test

@@ -3,10 +3,9 @@
 // The distal end of a femur, broken through its spongy bone with a gap of 1 mm: a scene that no single threshold
 // segments. The shaft's cortex is thick and bright; towards the joint it thins out to less than a voxel over spongy
 // bone of 280 HU, and the fracture's faces have no cortex at all.
-#include "marrow/domain/list.hpp"
 #include "tests/plugins/segment/phantom.hpp"
 
-namespace phantom {
+namespace marrow::test::bones {
 
 struct DistalEnd {
   double gap_mm = 1, spongy_hu = 280, tissue_hu = 50, marrow_hu = -40;
@@ -45,14 +44,14 @@ struct DistalEnd {
                  core = filled(surface + cortex_mm);
     return tissue_hu + bone * (cortex_hu + core * (inside_hu - cortex_hu) - tissue_hu);
   }
-  marrow::Volume scan_of(std::array<int, 3> size, double noise_hu) const {
+  Volume scan_of(std::array<int, 3> size, double noise_hu) const {
     return scan(
         ct_grid(size), [this](const Vector3d& p) { return hu(p); }, 0.5, noise_hu, 5);
   }
-  marrow::List<marrow::Seeds> seeds() const {
-    marrow::List<marrow::Seeds> seeds;
-    seeds.add("proximal", marrow::Seeds{"proximal", {{0, 0, -10}, {13, 1, 50}, {-12, 2, 50}}});
-    seeds.add("distal", marrow::Seeds{"distal", {{-20, 0, -66}, {20, 0, -64}, {0, 0, -45}}});
+  List<Seeds> seeds() const {
+    List<Seeds> seeds;
+    seeds.add("proximal", Seeds{"proximal", {{0, 0, -10}, {13, 1, 50}, {-12, 2, 50}}});
+    seeds.add("distal", Seeds{"distal", {{-20, 0, -66}, {20, 0, -64}, {0, 0, -45}}});
     return seeds;
   }
 
@@ -63,4 +62,6 @@ struct DistalEnd {
   }
 };
 
-}  // namespace phantom
+}  // namespace marrow::test::bones
+
+namespace phantom = marrow::test::bones;

@@ -1,27 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 // The smooth surface of labels, against shapes whose truth is known, on grids of several kinds.
-#include <gtest/gtest.h>
-
-#include <Eigen/Geometry>
-#include <cmath>
-#include <functional>
-#include <random>
-
-#include "marrow/domain/mesh.hpp"
-#include "marrow/domain/volume.hpp"
 #include "marrow/toolbox/analytic/body.hpp"
-#include "shipped.hpp"
-#include "tests/harness/message_of.hpp"
+#include "tests/harness/node_test.hpp"
 
-namespace given_test {
+namespace marrow::test::given_test {
 
-using Eigen::Vector3d;
-using marrow::Grid;
-using marrow::List;
-using marrow::Mesh;
-using marrow::SignedField;
-using marrow::Volume;
-using marrow::test::message_of;
+using message_of;
 
 using Distance = std::function<double(const Vector3d&)>;
 
@@ -53,12 +37,10 @@ Volume mask_of(const Grid& grid, const Distance& distance) {
   return mask;
 }
 
-SignedField field_by(const shipped::Inputs& inputs) {
-  return shipped::call("segment.given", inputs).at("field").as_list<SignedField>()[0];
-}
+SignedField field_by(const Inputs& inputs) { return output_list<SignedField>("segment.given", "field", inputs)[0]; }
 
 template <class T>
-marrow::Value one(const T& item) {
+Value one(const T& item) {
   List<T> list;
   list.add("bone", item);
   return shipped::list(list, "fragment");
@@ -70,7 +52,7 @@ struct Errors {
 
 /// Distances of the mesh's vertices from the true surface, at least `margin_mm` from the ends of the label's grid.
 Errors errors_of(const SignedField& field, const Distance& truth, const Grid& label_grid, double margin_mm) {
-  const Mesh mesh = shipped::call("mesh.marching_cubes", {{"field", shipped::item(field)}}).at("mesh").as<Mesh>();
+  const Mesh mesh = output<Mesh>("mesh.marching_cubes", "mesh", {{"field", item(field)}});
   Errors errors;
   double count = 0;
   for (const Vector3d& vertex : mesh.vertices_mm) {
@@ -134,7 +116,7 @@ TEST(Given, ALabelOnAnotherGridThanTheCt) {
   ct.values.assign(ct.grid.count(), 40);
   // Larger voxels, other axes, and cut to the bone with a margin of two voxels.
   const Grid grid = grid_of({21, 21, 21}, {1.4, 1.4, 1.4}, -0.9);
-  const SignedField field = field_by({{"volume", shipped::item(ct)}, {"label", one(mask_of(grid, ball))}});
+  const SignedField field = field_by({{"volume", item(ct)}, {"label", one(mask_of(grid, ball))}});
   EXPECT_EQ(field.grid.size, ct.grid.size);
   EXPECT_EQ(field.grid.direction, ct.grid.direction);
   const Errors errors = errors_of(field, ball, ct.grid, 0);
@@ -147,7 +129,7 @@ TEST(Given, ALabelThatEndsWithItsGridIsCutFlat) {
   const Distance shaft = cylinder(8, {0, 0, 1});
   const Grid grid = grid_of({24, 24, 21}, {1, 1, 1});  // z from -10 to 10
   const SignedField field = field_by({{"label", one(mask_of(grid, shaft))}});
-  const Mesh mesh = shipped::call("mesh.marching_cubes", {{"field", shipped::item(field)}}).at("mesh").as<Mesh>();
+  const Mesh mesh = output<Mesh>("mesh.marching_cubes", "mesh", {{"field", item(field)}});
   EXPECT_TRUE(is_closed(mesh));
   double lowest = 0, highest = 0;
   for (const Vector3d& vertex : mesh.vertices_mm) {
@@ -171,17 +153,16 @@ TEST(Given, NoVoxelChangesItsSide) {
 }
 
 TEST(Given, ASurfaceWithAndWithoutCt) {
-  const Mesh ball = marrow::analytic::mesh_of({{{3, -2, 40}, {8, 10, 30}}});
+  const Mesh ball = analytic::mesh_of({{{3, -2, 40}, {8, 10, 30}}});
   Volume ct{grid_of({60, 60, 110}, {0.8, 0.8, 0.8}), {}};
   ct.grid.origin_mm += Vector3d(3, -2, 40);
   ct.values.assign(ct.grid.count(), 40);
-  const double truth_mm3 = marrow::enclosed_volume_mm3(ball);
+  const double truth_mm3 = enclosed_volume_mm3(ball);
   for (const bool has_ct : {true, false}) {
-    shipped::Inputs inputs{{"surface", one(ball)}};
-    if (has_ct) inputs["volume"] = shipped::item(ct);
-    const Mesh found =
-        shipped::call("mesh.marching_cubes", {{"field", shipped::item(field_by(inputs))}}).at("mesh").as<Mesh>();
-    EXPECT_NEAR(marrow::enclosed_volume_mm3(found), truth_mm3, 0.005 * truth_mm3) << has_ct;
+    Inputs inputs{{"surface", one(ball)}};
+    if (has_ct) inputs["volume"] = item(ct);
+    const Mesh found = output<Mesh>("mesh.marching_cubes", "mesh", {{"field", item(field_by(inputs))}});
+    EXPECT_NEAR(enclosed_volume_mm3(found), truth_mm3, 0.005 * truth_mm3) << has_ct;
   }
 }
 
@@ -191,9 +172,9 @@ TEST(Given, WhatWasSegmentedIsPassedOn) {
 }
 
 TEST(Given, Faults) {
-  const Mesh ball = marrow::analytic::mesh_of({{{0, 0, 0}, {8, 8, 8}}});
+  const Mesh ball = analytic::mesh_of({{{0, 0, 0}, {8, 8, 8}}});
   const Volume mask = mask_of(grid_of({20, 20, 20}, {1, 1, 1}), sphere(8, kBeside));
-  const auto said = [](const shipped::Inputs& inputs) { return message_of([&] { field_by(inputs); }); };
+  const auto said = [](const Inputs& inputs) { return message_of([&] { field_by(inputs); }); };
   EXPECT_EQ(said({}), "nothing gives the fragments: neither a segmentation from seeds nor labels nor surfaces");
   EXPECT_EQ(said({{"label", one(mask)}, {"surface", one(ball)}}),
             "a fragment is given by a label or by a surface; got both");
@@ -202,7 +183,7 @@ TEST(Given, Faults) {
   EXPECT_EQ(said({{"surface", one(open)}}), "the surface of 'bone' is open, so it has no inside; close its holes");
   Volume elsewhere{grid_of({9, 9, 9}, {1, 1, 1}), std::vector<float>(729, 40)};
   elsewhere.grid.origin_mm += Vector3d(500, 0, 0);
-  EXPECT_EQ(said({{"volume", shipped::item(elsewhere)}, {"label", one(mask)}}),
+  EXPECT_EQ(said({{"volume", item(elsewhere)}, {"label", one(mask)}}),
             "fragment 'bone' has no voxel of the CT: its label or surface lies elsewhere. Were they made from another "
             "scan, or is the surface in another unit or frame (RAS)?");
   Volume nothing = mask;
@@ -210,4 +191,4 @@ TEST(Given, Faults) {
   EXPECT_EQ(said({{"label", one(nothing)}}), "mask: no voxel is inside");
 }
 
-}  // namespace given_test
+}  // namespace marrow::test::given_test

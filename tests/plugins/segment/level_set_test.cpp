@@ -1,24 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <gtest/gtest.h>
 #include <tbb/global_control.h>
-
-#include <Eigen/Geometry>
-#include <algorithm>
-#include <chrono>
-#include <cmath>
 #include <cstring>
-#include <functional>
 
 #include "tests/plugins/segment/distal_end.hpp"
 #include "tests/plugins/segment/segmented.hpp"
 
-namespace level_set_test {
-
-using Eigen::Vector3d;
-using marrow::List;
-using marrow::Seeds;
-using marrow::SignedField;
-using marrow::Volume;
+namespace marrow::test::level_set_test {
 
 List<SignedField> level_set_fields(const Volume& volume, const List<Seeds>& seeds) {
   return segmented::fields("segment.level_set", volume, seeds);
@@ -28,12 +15,12 @@ List<SignedField> level_set_fields(const Volume& volume, const List<Seeds>& seed
 struct HollowBone {
   double inside_hu = -20, wall_low_mm = 7, wall_high_mm = 1.5, radius_low_mm = 13, radius_high_mm = 19;
   Vector3d low{-3, -2, -60}, high{3, 2, 60};
-  double outer(const Vector3d& p) const { return phantom::round_cone(p, low, high, radius_low_mm, radius_high_mm); }
+  double outer(const Vector3d& p) const { return bones::round_cone(p, low, high, radius_low_mm, radius_high_mm); }
   double inner(const Vector3d& p) const {
-    return phantom::round_cone(p, low, high, radius_low_mm - wall_low_mm, radius_high_mm - wall_high_mm);
+    return bones::round_cone(p, low, high, radius_low_mm - wall_low_mm, radius_high_mm - wall_high_mm);
   }
   double hu(const Vector3d& p, double cut_mm = -1e9) const {
-    const double bone = phantom::filled(std::max(outer(p), cut_mm)), canal = phantom::filled(inner(p));
+    const double bone = bones::filled(std::max(outer(p), cut_mm)), canal = bones::filled(inner(p));
     return 50 + bone * (1400 - 50) + bone * canal * (inside_hu - 1400);
   }
   /// Halfway through the wall.
@@ -46,30 +33,17 @@ struct HollowBone {
   }
 };
 
-double timed(const std::function<void()>& work) {
-  const auto start = std::chrono::steady_clock::now();
-  work();
-  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-}
-
 TEST(LevelSet, HollowBoneOverMarrowAndOverSpongyBone) {
   for (double inside_hu : {-20.0, 300.0}) {
     HollowBone bone;
     bone.inside_hu = inside_hu;
-    const Volume volume = phantom::scan(
-        phantom::ct_grid({64, 60, 110}), [&](const Vector3d& p) { return bone.hu(p); }, 0.5, 30, 1);
+    const Volume volume = bones::scan(
+        bones::ct_grid({64, 60, 110}), [&](const Vector3d& p) { return bone.hu(p); }, 0.5, 30, 1);
     List<Seeds> seeds;
     seeds.add("distal", Seeds{"distal", {bone.seed(-20)}});
-    List<SignedField> fields;
-    const double seconds = timed([&] { fields = level_set_fields(volume, seeds); });
+    const auto fields = level_set_fields(volume, seeds);
     ASSERT_EQ(fields.size(), 1u);
-    const auto accuracy = phantom::compare(fields[0], [&](const Vector3d& p) { return bone.outer(p); });
-    phantom::print("inside " + std::to_string(int(inside_hu)) + " HU", accuracy);
-    for (double z : {-45, -15, 15, 45})
-      phantom::print("  z " + std::to_string(int(z)), phantom::compare(
-                                                          fields[0], [&](const Vector3d& p) { return bone.outer(p); },
-                                                          [&](const Vector3d& p) { return std::abs(p.z() - z) < 5; }));
-    std::printf("%.2f s\n", seconds);
+    const auto accuracy = bones::compare(fields[0], [&](const Vector3d& p) { return bone.outer(p); });
     EXPECT_GT(accuracy.dice, 0.99);
     EXPECT_LT(std::abs(accuracy.bias_mm), 0.03);
     EXPECT_LT(accuracy.mean_mm, 0.08);
@@ -81,8 +55,8 @@ TEST(LevelSet, TwoFragmentsOneMillimetreApart) {
   bone.wall_high_mm = 4;
   const Vector3d normal = Vector3d(0.5, 0.2, 1).normalized();
   const auto cut = [&](const Vector3d& p) { return 0.5 - std::abs(normal.dot(p)); };  // > 0 in the gap
-  const Volume volume = phantom::scan(
-      phantom::ct_grid({64, 60, 110}), [&](const Vector3d& p) { return bone.hu(p, cut(p)); }, 0.5, 30, 2);
+  const Volume volume = bones::scan(
+      bones::ct_grid({64, 60, 110}), [&](const Vector3d& p) { return bone.hu(p, cut(p)); }, 0.5, 30, 2);
   List<Seeds> seeds;
   seeds.add("proximal", Seeds{"proximal", {bone.seed(30)}});
   seeds.add("distal", Seeds{"distal", {bone.seed(-30)}});
@@ -92,13 +66,12 @@ TEST(LevelSet, TwoFragmentsOneMillimetreApart) {
     const double side = f == 0 ? -1 : 1;
     const auto truth = [&](const Vector3d& p) { return std::max(bone.outer(p), side * normal.dot(p) + 0.5); };
     const auto on_wall = [&](const Vector3d& p) { return std::abs(normal.dot(p)) > 4; };
-    const auto wall = phantom::compare(fields[f], truth, on_wall);
-    phantom::print(fields.name(f) + " wall", wall);
+    const auto wall = bones::compare(fields[f], truth, on_wall);
     EXPECT_LT(std::abs(wall.bias_mm), 0.03);
     EXPECT_LT(wall.mean_mm, 0.08);
-    phantom::print(fields.name(f) + " fracture",
-                   phantom::compare(fields[f], truth, [&](const Vector3d& p) { return !on_wall(p); }));
-    EXPECT_GT(phantom::compare(fields[f], truth).dice, 0.97);
+    bones::print(fields.name(f) + " fracture",
+                 bones::compare(fields[f], truth, [&](const Vector3d& p) { return !on_wall(p); }));
+    EXPECT_GT(bones::compare(fields[f], truth).dice, 0.97);
   }
   for (std::size_t at = 0; at < fields[0].values_mm.size(); ++at)
     ASSERT_FALSE(fields[0].values_mm[at] < 0 && fields[1].values_mm[at] < 0) << "both claim voxel " << at;
@@ -107,9 +80,8 @@ TEST(LevelSet, TwoFragmentsOneMillimetreApart) {
 TEST(LevelSet, AFragmentIsTheSameWhetherTheOtherIsWantedOrOnlyKeptApart) {
   HollowBone bone;
   bone.wall_high_mm = 4;
-  const Volume volume = phantom::scan(
-      phantom::ct_grid({64, 60, 150}), [&](const Vector3d& p) { return bone.hu(p, 0.5 - std::abs(p.z())); }, 0.5, 30,
-      2);
+  const Volume volume = bones::scan(
+      bones::ct_grid({64, 60, 150}), [&](const Vector3d& p) { return bone.hu(p, 0.5 - std::abs(p.z())); }, 0.5, 30, 2);
   const auto distal = [&](bool other_is_wanted) {
     List<Seeds> seeds;
     seeds.add("proximal", Seeds{"proximal", {bone.seed(30)}, other_is_wanted});
@@ -126,10 +98,10 @@ TEST(LevelSet, TwoFragmentsInVoxelsAsWideAsTheGap) {
   bone.wall_high_mm = 4;
   for (double gap_mm : {1.2, 2.0, 4.0}) {
     const Vector3d normal = Vector3d(0.5, 0.2, 1).normalized();
-    marrow::Grid grid = phantom::ct_grid({44, 42, 92});
+    Grid grid = bones::ct_grid({44, 42, 92});
     grid.spacing_mm.setConstant(1.2);
     grid.origin_mm = -Vector3d(43, 41, 91) * 0.6;
-    const Volume volume = phantom::scan(
+    const Volume volume = bones::scan(
         grid, [&](const Vector3d& p) { return bone.hu(p, gap_mm / 2 - std::abs(normal.dot(p))); }, 0.5, 30, 2);
     List<Seeds> seeds;
     seeds.add("proximal", Seeds{"proximal", {bone.seed(40)}});
@@ -139,8 +111,7 @@ TEST(LevelSet, TwoFragmentsInVoxelsAsWideAsTheGap) {
       const double side = f == 0 ? -1 : 1;
       const auto truth = [&](const Vector3d& p) { return std::max(bone.outer(p), side * normal.dot(p) + gap_mm / 2); };
       const auto wall =
-          phantom::compare(fields[f], truth, [&](const Vector3d& p) { return std::abs(normal.dot(p)) > 5; });
-      phantom::print("gap " + std::to_string(gap_mm) + " " + fields.name(f), wall);
+          bones::compare(fields[f], truth, [&](const Vector3d& p) { return std::abs(normal.dot(p)) > 5; });
       EXPECT_GT(wall.dice, 0.97);
       EXPECT_LT(std::abs(wall.bias_mm), 0.05);
       EXPECT_LT(wall.mean_mm, 0.1);
@@ -149,16 +120,13 @@ TEST(LevelSet, TwoFragmentsInVoxelsAsWideAsTheGap) {
 }
 
 TEST(LevelSet, ADistalEndWithThinCortexAndAnInvisibleGap) {
-  const phantom::DistalEnd bone;
+  const bones::DistalEnd bone;
   const Volume volume = bone.scan_of({128, 128, 192}, 40);
-  List<SignedField> fields;
-  const double seconds = timed([&] { fields = level_set_fields(volume, bone.seeds()); });
-  std::printf("%.2f s\n", seconds);
+  const auto fields = level_set_fields(volume, bone.seeds());
   for (std::size_t f = 0; f < 2; ++f) {
-    const auto accuracy = phantom::compare(
+    const auto accuracy = bones::compare(
         fields[f], [&](const Vector3d& p) { return bone.distance(p, f == 0 ? 1 : -1); },
         [](const Vector3d& p) { return p.z() < 90; });
-    phantom::print(fields.name(f), accuracy);
     EXPECT_GT(accuracy.dice, 0.99);
     EXPECT_LT(std::abs(accuracy.bias_mm), 0.06);
     EXPECT_LT(accuracy.mean_mm, 0.1);
@@ -167,7 +135,7 @@ TEST(LevelSet, ADistalEndWithThinCortexAndAnInvisibleGap) {
 
 /// A short bone in a grid that is turned against the frame, both ends inside the volume.
 struct ShortBone {
-  marrow::Grid grid = phantom::ct_grid({48, 48, 56});
+  Grid grid = bones::ct_grid({48, 48, 56});
   ShortBone() {
     grid.direction = Eigen::AngleAxisd(0.5, Vector3d(1, -1, 2).normalized()).toRotationMatrix();
     const Vector3d middle = Vector3d(grid.size[0] - 1, grid.size[1] - 1, grid.size[2] - 1) / 2;
@@ -176,10 +144,10 @@ struct ShortBone {
   Vector3d at(double x, double y, double z) const {
     return Vector3d(100, -50, 30) + grid.direction * Vector3d(x, y, z);
   }
-  double outer(const Vector3d& p) const { return phantom::round_cone(p, at(0, 0, -10), at(0, 0, 10), 9, 11); }
-  double hu(const Vector3d& p) const { return 50 + 1300 * phantom::filled(outer(p)) * phantom::filled(-outer(p) - 3); }
+  double outer(const Vector3d& p) const { return bones::round_cone(p, at(0, 0, -10), at(0, 0, 10), 9, 11); }
+  double hu(const Vector3d& p) const { return 50 + 1300 * bones::filled(outer(p)) * bones::filled(-outer(p) - 3); }
   Volume volume() const {
-    return phantom::scan(
+    return bones::scan(
         grid, [&](const Vector3d& p) { return hu(p); }, 0.5, 30, 4);
   }
   List<Seeds> seeds(const Vector3d& point) const {
@@ -198,15 +166,14 @@ TEST(LevelSet, TurnedGridAndTheSameBytesAtAnyNumberOfThreads) {
   };
   const auto one = at_threads(1), two = at_threads(2);
   EXPECT_EQ(std::memcmp(one[0].values_mm.data(), two[0].values_mm.data(), one[0].values_mm.size() * sizeof(float)), 0);
-  const auto accuracy = phantom::compare(one[0], [&](const Vector3d& p) { return bone.outer(p); });
-  phantom::print("turned, closed shell of 3 mm", accuracy);
+  const auto accuracy = bones::compare(one[0], [&](const Vector3d& p) { return bone.outer(p); });
   EXPECT_GT(accuracy.dice, 0.985);
   EXPECT_LT(std::abs(accuracy.bias_mm), 0.06);
   EXPECT_LT(accuracy.mean_mm, 0.09);
 }
 
 std::string message_of(const Volume& volume, const List<Seeds>& seeds) {
-  return shipped::refusal("segment.level_set", segmented::inputs(volume, seeds));
+  return refusal("segment.level_set", segmented::inputs(volume, seeds));
 }
 
 TEST(LevelSet, SaysWhatIsWrongWithSeeds) {
@@ -224,30 +191,4 @@ TEST(LevelSet, SaysWhatIsWrongWithSeeds) {
   EXPECT_NE(message_of(volume, {}).find("is not a finite number"), std::string::npos);
 }
 
-// For timing, as it takes longer than a test should: --gtest_also_run_disabled_tests.
-TEST(LevelSet, DISABLED_WholeFemurInSeconds) {
-  HollowBone bone;
-  bone.low = {-8, -5, -250};
-  bone.high = {8, 5, 200};
-  bone.radius_high_mm = 32;
-  const Vector3d normal = Vector3d(0.5, 0.2, 1).normalized();
-  const auto cut = [&](const Vector3d& p) { return 3 - std::abs(normal.dot(p)); };
-  const Volume volume = phantom::scan(
-      phantom::ct_grid({130, 110, 470}), [&](const Vector3d& p) { return bone.hu(p, cut(p)); }, 0.5, 30, 2);
-  List<Seeds> seeds;
-  seeds.add("proximal", Seeds{"proximal", {bone.seed(60)}, false});
-  seeds.add("distal", Seeds{"distal", {bone.seed(-60)}});
-  List<SignedField> fields;
-  const double seconds = timed([&] { fields = level_set_fields(volume, seeds); });
-  std::printf("130x110x470, two fragments: %.2f s\n", seconds);
-  RecordProperty("milliseconds", int(1000 * seconds));
-  ASSERT_EQ(fields.size(), 1u);
-  EXPECT_EQ(fields.name(0), "distal");
-  const auto truth = [&](const Vector3d& p) { return std::max(bone.outer(p), normal.dot(p) + 3); };
-  const auto accuracy = phantom::compare(fields[0], truth, [&](const Vector3d& p) { return normal.dot(p) < -10; });
-  phantom::print("distal wall", accuracy);
-  EXPECT_GT(accuracy.dice, 0.97);
-  EXPECT_LT(std::abs(accuracy.bias_mm), 0.1);
-}
-
-}  // namespace level_set_test
+}  // namespace marrow::test::level_set_test

@@ -1,25 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 // A network of one convolution is a soft threshold of the CT, so what it must find is known exactly.
-#include <gtest/gtest.h>
 #include <tbb/global_control.h>
-
-#include <algorithm>
-#include <cmath>
 
 #include "tests/plugins/segment/broken_tube.hpp"
 #include "tests/plugins/segment/segmented.hpp"
 #include "tests/plugins/toolbox/network/written.hpp"
 
-namespace network_test {
+namespace marrow::test::network_test {
 
-using Eigen::Vector3d;
-using marrow::List;
-using marrow::Seeds;
-using marrow::SignedField;
-using marrow::Volume;
-using marrow::test::Convolution;
-using marrow::test::with;
-using marrow::test::Written;
+using Convolution;
+using with;
+using Written;
 
 constexpr const char* kNode = "segment.network";
 constexpr double kThreshold_hu = 600;
@@ -47,13 +38,13 @@ std::string soft_threshold() {
 }
 
 List<SignedField> fields_of(const Written& network, const Volume& volume, const List<Seeds>& seeds,
-                            shipped::Options options = {}) {
+                            Options options = {}) {
   options["network"] = network.file().string();
   return segmented::fields(kNode, volume, seeds, options);
 }
 
 TEST(SegmentNetwork, ASoftThresholdFindsTheVoxelsOfTheThreshold) {
-  const phantom::BrokenTube tube{.gap_mm = 3};
+  const bones::BrokenTube tube{.gap_mm = 3};
   const Volume volume = tube.volume();
   const auto found = fields_of(Written(soft_threshold(), kSlices), volume, tube.seeds());
   const auto expected = segmented::fields("segment.threshold", volume, tube.seeds(), {{"threshold_hu", kThreshold_hu}});
@@ -72,16 +63,15 @@ TEST(SegmentNetwork, ASoftThresholdFindsTheVoxelsOfTheThreshold) {
 class Pixels : public testing::TestWithParam<std::pair<const char*, double>> {};
 
 TEST_P(Pixels, TheSurfaceLiesBetweenTheVoxels) {
-  const phantom::BrokenTube tube{.gap_mm = 1.5};
+  const bones::BrokenTube tube{.gap_mm = 1.5};
   const auto fields =
       fields_of(Written(soft_threshold(), with(kSlices, "pixel_px: 1", GetParam().first)), tube.volume(), tube.seeds());
   for (std::size_t f = 0; f < 2; ++f) {
     const auto accuracy = tube.compare(fields, f);
-    phantom::print(std::string(GetParam().first) + ", " + fields.name(f), accuracy);
     EXPECT_LT(accuracy.mean_mm, GetParam().second);
     EXPECT_LT(std::abs(accuracy.bias_mm), GetParam().second);
   }
-  EXPECT_EQ(phantom::overlap(fields), 0u);
+  EXPECT_EQ(bones::overlap(fields), 0u);
 }
 
 INSTANTIATE_TEST_SUITE_P(Sizes, Pixels,
@@ -92,7 +82,7 @@ TEST(SegmentNetwork, TakesNeighbouringSlicesInTheirOrder) {
   // Only the slice above counts, so the bone is found one slice too low.
   const Written above(Convolution{.channels = 3, .side = 1, .weights = {0, 0, 4}, .bias = {-2}}.bytes(),
                       with(kSlices, "overlap_px: 8", "overlap_px: 8\n  slices: 3"));
-  Volume volume{phantom::ct_grid({16, 16, 20}), {}};
+  Volume volume{bones::ct_grid({16, 16, 20}), {}};
   volume.values.assign(volume.grid.count(), -100);
   for (int z = 8; z < 14; ++z)
     for (int y = 4; y < 12; ++y)
@@ -104,7 +94,7 @@ TEST(SegmentNetwork, TakesNeighbouringSlicesInTheirOrder) {
 }
 
 TEST(SegmentNetwork, FragmentsMeetWhereTheNetworkIsLeastSure) {
-  Volume volume{phantom::ct_grid({12, 12, 40}), {}};
+  Volume volume{bones::ct_grid({12, 12, 40}), {}};
   volume.values.assign(volume.grid.count(), -100);
   for (int z = 4; z < 36; ++z)
     for (int y = 3; y < 9; ++y)
@@ -121,14 +111,14 @@ TEST(SegmentNetwork, FragmentsMeetWhereTheNetworkIsLeastSure) {
 }
 
 TEST(SegmentNetwork, AddsUpTheClassesThatAreBone) {
-  const phantom::BrokenTube tube{.gap_mm = 3};
+  const bones::BrokenTube tube{.gap_mm = 3};
   const Written two(Convolution{.side = 1, .weights = {0, 4, 4}, .bias = {2.4f, -1, -1}}.bytes(),
                     with(kSlices, "names: [bone], activation: sigmoid",
                          "names: [rest, femur, tibia], activation: "
                          "softmax"));
   const Volume volume = tube.volume();
-  const std::vector<std::string> both{"femur", "tibia"}, one{"femur"};
-  const auto voxels = [&](const std::vector<std::string>& bone) {
+  const Strings both{"femur", "tibia"}, one{"femur"};
+  const auto voxels = [&](const Strings& bone) {
     const auto& values = fields_of(two, volume, tube.seeds(), {{"bone", bone}, {"probability", 0.45}})[0].values_mm;
     return std::count_if(values.begin(), values.end(), [](float value) { return value < 0; });
   };
@@ -136,7 +126,7 @@ TEST(SegmentNetwork, AddsUpTheClassesThatAreBone) {
 }
 
 TEST(SegmentNetwork, GivesTheSameBytesAtAnyNumberOfThreads) {
-  const phantom::BrokenTube tube;
+  const bones::BrokenTube tube;
   const Volume volume = tube.volume();
   const Written network(soft_threshold(), with(kSlices, "pixel_px: 1", "pixel_mm: 0.6"));
   const auto at = [&](std::size_t threads) {
@@ -146,12 +136,11 @@ TEST(SegmentNetwork, GivesTheSameBytesAtAnyNumberOfThreads) {
   EXPECT_TRUE(at(1) == at(4));
 }
 
-std::string refusal_of(const std::string& description, shipped::Options options = {}) {
-  static const shipped::Inputs inputs =
-      segmented::inputs(phantom::BrokenTube().volume(), phantom::BrokenTube().seeds());
+std::string refusal_of(const std::string& description, Options options = {}) {
+  static const Inputs inputs = segmented::inputs(bones::BrokenTube().volume(), bones::BrokenTube().seeds());
   const Written network(soft_threshold(), description);
   options["network"] = network.file().string();
-  std::string said = shipped::refusal(kNode, inputs, options);
+  std::string said = refusal(kNode, inputs, options);
   const std::string file = network.file().string();
   if (said.starts_with(file)) said.replace(0, file.size(), "FILE");
   return said;
@@ -160,7 +149,7 @@ std::string refusal_of(const std::string& description, shipped::Options options 
 TEST(SegmentNetwork, SaysWhatDoesNotFit) {
   EXPECT_EQ(refusal_of(with(kSlices, "values: hounsfield", "values: grey_values")),
             "FILE: the network wants values: grey_values, but segment.network can give only hounsfield");
-  EXPECT_EQ(refusal_of(kSlices, {{"bone", std::vector<std::string>{"bones"}}}),
+  EXPECT_EQ(refusal_of(kSlices, {{"bone", Strings{"bones"}}}),
             "FILE: the network has no class 'bones'; did you mean 'bone'?");
   EXPECT_EQ(refusal_of(with(kSlices, "classes: {layer: maps, names: [bone],", "edge_strength: {layer: maps,")),
             "FILE: the network has no output 'classes'; it has edge_strength");
@@ -171,4 +160,4 @@ TEST(SegmentNetwork, SaysWhatDoesNotFit) {
       "for such a CT");
 }
 
-}  // namespace network_test
+}  // namespace marrow::test::network_test

@@ -3,17 +3,10 @@
 // Analytic hollow bones, the CT that a scanner would make of them, and how far a field's surface lies from the truth.
 #include <tbb/parallel_for.h>
 
-#include <Eigen/Geometry>
-#include <cmath>
-#include <functional>
-#include <random>
-#include <string>
+#include "tests/harness/node_test.hpp"
 
-#include "marrow/domain/volume.hpp"
+namespace marrow::test::bones {
 
-namespace phantom {
-
-using Eigen::Vector3d;
 using Distance = std::function<double(const Vector3d&)>;
 
 /// Signed distance to a cone with spherical ends (exact).
@@ -58,8 +51,7 @@ inline void blur_axis(std::vector<float>& values, const std::array<int, 3>& size
 }
 
 /// The CT of a scene: 2 x 2 x 2 sub-voxels, a Gaussian point-spread function, the mean over each voxel, Gaussian noise.
-inline marrow::Volume scan(const marrow::Grid& grid, const Scene& scene, double psf_mm, double noise_hu,
-                           unsigned seed) {
+inline Volume scan(const Grid& grid, const Scene& scene, double psf_mm, double noise_hu, unsigned seed) {
   const std::array<int, 3> fine{grid.size[0] * 2, grid.size[1] * 2, grid.size[2] * 2};
   std::vector<float> values(std::size_t(fine[0]) * fine[1] * fine[2]);
   const auto at = [&](int x, int y, int z) { return (std::size_t(z) * fine[1] + y) * fine[0] + x; };
@@ -69,7 +61,7 @@ inline marrow::Volume scan(const marrow::Grid& grid, const Scene& scene, double 
         values[at(x, y, z)] = float(scene(grid.point_from_index(Vector3d(x, y, z) / 2 - Vector3d::Constant(0.25))));
   });
   for (int axis = 0; axis < 3; ++axis) blur_axis(values, fine, axis, psf_mm / grid.spacing_mm[axis] * 2);
-  marrow::Volume volume{grid, std::vector<float>(grid.count())};
+  Volume volume{grid, std::vector<float>(grid.count())};
   std::mt19937 random(seed);
   for (int z = 0; z < grid.size[2]; ++z)
     for (int y = 0; y < grid.size[1]; ++y)
@@ -90,9 +82,9 @@ struct Accuracy {
 /// Compares a field with the true signed distance: Dice over voxels, and the true distance of each point where the
 /// field's zero level crosses a grid edge, as far as `counts` says that the point counts.
 inline Accuracy compare(
-    const marrow::SignedField& field, const Distance& truth_mm,
+    const SignedField& field, const Distance& truth_mm,
     const std::function<bool(const Vector3d&)>& counts = [](const Vector3d&) { return true; }) {
-  const marrow::Grid& grid = field.grid;
+  const Grid& grid = field.grid;
   Accuracy accuracy;
   double both = 0, either = 0;
   for (int z = 0; z < grid.size[2]; ++z)
@@ -124,18 +116,10 @@ inline Accuracy compare(
   return accuracy;
 }
 
-inline void print(const std::string& what, const Accuracy& a) {
-  std::printf("%-34s Dice %.4f  bias %+.3f mm  mean %.3f mm  rms %.3f mm  largest %.2f mm  (%zu points)\n",
-              what.c_str(), a.dice, a.bias_mm, a.mean_mm, a.rms_mm, a.largest_mm, a.points);
-}
-
 /// A grid with the CT's spacing, centred on the origin.
-inline marrow::Grid ct_grid(std::array<int, 3> size) {
-  marrow::Grid grid;
-  grid.size = size;
-  grid.spacing_mm = {0.8, 0.8, 1.0};
-  grid.origin_mm = -Vector3d(size[0] - 1, size[1] - 1, size[2] - 1).cwiseProduct(grid.spacing_mm) / 2;
-  return grid;
+inline Grid ct_grid(const std::array<int, 3>& size) {
+  const Vector3d spacing_mm(0.8, 0.8, 1.0);
+  return grid_at(size, -Vector3d(size[0] - 1, size[1] - 1, size[2] - 1).cwiseProduct(spacing_mm) / 2, spacing_mm);
 }
 
-}  // namespace phantom
+}  // namespace marrow::test::bones

@@ -1,20 +1,18 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <gtest/gtest.h>
-
 #include "tests/plugins/segment/broken_tube.hpp"
 #include "tests/plugins/segment/segmented.hpp"
 
-namespace region_growing_test {
+namespace marrow::test::region_growing_test {
 
 constexpr const char* kNode = "segment.region_growing";
 
 TEST(RegionGrowing, TwoFragmentsOneMillimetreApart) {
-  const phantom::BrokenTube tube;
-  phantom::expect_both(tube, segmented::fields(kNode, tube.volume(), tube.seeds(), {{"threshold_hu", 650.0}}));
+  const bones::BrokenTube tube;
+  bones::expect_both(tube, segmented::fields(kNode, tube.volume(), tube.seeds(), {{"threshold_hu", 650.0}}));
 }
 
 TEST(RegionGrowing, GivesOnlyWantedFragmentsAndKeepsThemFromTheOthersBone) {
-  const phantom::BrokenTube tube;
+  const bones::BrokenTube tube;
   const auto both = segmented::fields(kNode, tube.volume(), tube.seeds());
   const auto one = segmented::fields(kNode, tube.volume(), tube.seeds(false));
   ASSERT_EQ(one.size(), 1u);
@@ -26,11 +24,11 @@ TEST(RegionGrowing, GivesOnlyWantedFragmentsAndKeepsThemFromTheOthersBone) {
 }
 
 TEST(RegionGrowing, SaysWhatIsWrongWithSeeds) {
-  const phantom::BrokenTube tube;
-  marrow::List<marrow::Seeds> seeds;
-  seeds.add("distal", marrow::Seeds{"distal", {{0, 0, -15}}});
-  const std::string text = shipped::refusal(kNode, segmented::inputs(tube.volume(), seeds));
+  const bones::BrokenTube tube;
+  List<Seeds> seeds;
+  seeds.add("distal", Seeds{"distal", {{0, 0, -15}}});
+  const std::string text = refusal(kNode, segmented::inputs(tube.volume(), seeds));
   EXPECT_NE(text.find("is not in bone"), std::string::npos) << text;
 }
 
-}  // namespace region_growing_test
+}  // namespace marrow::test::region_growing_test

@@ -1,23 +1,18 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 // What the segmenters of the kind make of a volume.
-#include <string>
+#include "tests/harness/node_test.hpp"
 
-#include "marrow/domain/list.hpp"
-#include "marrow/domain/volume.hpp"
-#include "shipped.hpp"
+namespace marrow::test::segmented {
 
-namespace segmented {
-
-inline shipped::Inputs inputs(const marrow::Volume& volume, const marrow::List<marrow::Seeds>& seeds) {
-  return {{"volume", shipped::item(volume)}, {"seeds", shipped::list(seeds, "fragment")}};
+inline Inputs inputs(const Volume& volume, const List<Seeds>& seeds) {
+  return {{"volume", item(volume)}, {"seeds", shipped::list(seeds, "fragment")}};
 }
 
 /// The fields that a node gives.
-inline marrow::List<marrow::SignedField> fields(const std::string& node, const marrow::Volume& volume,
-                                                const marrow::List<marrow::Seeds>& seeds,
-                                                const shipped::Options& options = {}) {
-  return shipped::call(node, inputs(volume, seeds), options).at("field").as_list<marrow::SignedField>();
+inline List<SignedField> fields(const std::string& node, const Volume& volume, const List<Seeds>& seeds,
+                                const Options& options = {}) {
+  return output_list<SignedField>(node, "field", inputs(volume, seeds), options);
 }
 
-}  // namespace segmented
+}  // namespace marrow::test::segmented

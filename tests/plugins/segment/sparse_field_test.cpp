@@ -1,31 +1,29 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <gtest/gtest.h>
-
 #include "tests/plugins/segment/broken_tube.hpp"
 #include "tests/plugins/segment/segmented.hpp"
 
-namespace sparse_field_test {
+namespace marrow::test::sparse_field_test {
 
 constexpr const char* kNode = "segment.sparse_field";
 
 TEST(SparseField, TwoFragmentsOneMillimetreApart) {
-  const phantom::BrokenTube tube;
-  phantom::expect_both(tube, segmented::fields(kNode, tube.volume(), tube.seeds()));
+  const bones::BrokenTube tube;
+  bones::expect_both(tube, segmented::fields(kNode, tube.volume(), tube.seeds()));
 }
 
 TEST(SparseField, GivesOnlyWantedFragments) {
-  const phantom::BrokenTube tube;
+  const bones::BrokenTube tube;
   const auto fields = segmented::fields(kNode, tube.volume(), tube.seeds(false));
   ASSERT_EQ(fields.size(), 1u);
   EXPECT_EQ(fields.name(0), "distal");
 }
 
 TEST(SparseField, SaysWhenTheVolumeIsTooThin) {
-  const marrow::Volume volume{phantom::ct_grid({20, 20, 3}), std::vector<float>(1200, 900.f)};
-  marrow::List<marrow::Seeds> seeds;
-  seeds.add("distal", marrow::Seeds{"distal", {{0, 0, 0}}});
-  EXPECT_EQ(shipped::refusal(kNode, segmented::inputs(volume, seeds)),
+  const Volume volume{bones::ct_grid({20, 20, 3}), std::vector<float>(1200, 900.f)};
+  List<Seeds> seeds;
+  seeds.add("distal", Seeds{"distal", {{0, 0, 0}}});
+  EXPECT_EQ(refusal(kNode, segmented::inputs(volume, seeds)),
             "volume: at least 4 voxels along each axis expected, got 3");
 }
 
-}  // namespace sparse_field_test
+}  // namespace marrow::test::sparse_field_test

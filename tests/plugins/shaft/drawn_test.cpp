@@ -1,22 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
 // Exact drawn lines, for the nodes that find their lines in the edge map alone.
-#include <gtest/gtest.h>
-
 #include <cstdio>
 
-#include "tests/harness/message_of.hpp"
 #include "tests/plugins/shaft/scenes.hpp"
 
-namespace drawn_test {
+namespace marrow::test::drawn_test {
 
 using namespace scenes;
-using marrow::ShaftLines;
-using marrow::test::message_of;
 
 class DrawnShaft : public Shaft {
  protected:
   /// Exactly drawn lines differ from those of a round bone.
-  ShaftLines find_drawn(const marrow::EdgeMap& edges, const marrow::View& view) const {
+  ShaftLines find_drawn(const EdgeMap& edges, const View& view) const {
     return find_shaft(edges, view, {{"outline", false}});
   }
 };
@@ -25,7 +20,7 @@ INSTANTIATE_TEST_SUITE_P(, DrawnShaft, testing::Values("hough_pairs", "ransac"),
                          [](const auto& node) { return node.param; });
 
 TEST_P(DrawnShaft, EndsWhereOneBorderEnds) {
-  marrow::EdgeMap edges = no_edges();  // 85 px are 29.9 mm; condyles bend away below v = 300 on one side
+  EdgeMap edges = no_edges();  // 85 px are 29.9 mm; condyles bend away below v = 300 on one side
   draw(edges, {200, 20}, {200, 480}, kLeft);
   draw(edges, {285, 20}, {285, 300}, kRight);
   draw(edges, {286, 301}, {380, 380}, kRight);
@@ -38,11 +33,11 @@ TEST_P(DrawnShaft, EndsWhereOneBorderEnds) {
 }
 
 TEST_P(DrawnShaft, AllowsATaperAndPrefersTheLikelierWidth) {
-  marrow::EdgeMap edges = no_edges();
+  EdgeMap edges = no_edges();
   draw(edges, {200, 20}, {195, 400}, kLeft);
   draw(edges, {283, 20}, {290, 400}, kRight);
   draw(edges, {300, 20}, {307, 400}, kRight);  // 36 mm: allowed, but less likely
-  marrow::View view = empty_view();
+  View view = empty_view();
   for (int v = 0; v < 512; ++v) {
     const double part = (v - 20) / 380.0;
     for (int u = int(200 - 5 * part); u < 300 + 7 * part; ++u)
@@ -57,7 +52,7 @@ TEST_P(DrawnShaft, AllowsATaperAndPrefersTheLikelierWidth) {
 
 // A bowed shaft has many lines; their pairs must not crowd the shaft of a second fragment out of the list.
 TEST_P(DrawnShaft, ListsTheShaftOfASecondFragment) {
-  marrow::EdgeMap edges = no_edges();
+  EdgeMap edges = no_edges();
   const auto bow = [](double v) { return 0.0008 * (v - 150) * (v - 150); };
   for (double v = 10; v < 300; v += 10)
     for (const auto& [u, side] : {std::pair(200.0, kLeft), std::pair(285.0, kRight)})
@@ -78,7 +73,7 @@ TEST_P(DrawnShaft, ListsTheShaftOfASecondFragment) {
 }
 
 TEST_P(DrawnShaft, ToleratesGapsUpToTheLimit) {
-  marrow::EdgeMap edges = no_edges();
+  EdgeMap edges = no_edges();
   for (double v = 20; v < 400; v += 60) {  // gaps of 20 px = 7 mm
     draw(edges, {200, v}, {200, v + 40}, kLeft);
     draw(edges, {285, v}, {285, v + 40}, kRight);
@@ -88,7 +83,7 @@ TEST_P(DrawnShaft, ToleratesGapsUpToTheLimit) {
 
 // A ridge of the bone lies outside the border of what is behind it.
 TEST_P(DrawnShaft, EndsWhereItRunsOnInsideARidge) {
-  marrow::EdgeMap edges = no_edges();
+  EdgeMap edges = no_edges();
   draw(edges, {200, 20}, {200, 480}, kLeft);
   draw(edges, {285, 20}, {285, 480}, kRight);
   draw(edges, {295, 20}, {295, 200}, kRight);
@@ -99,7 +94,7 @@ TEST_P(DrawnShaft, EndsWhereItRunsOnInsideARidge) {
 
 TEST_P(DrawnShaft, SaysWhyThereIsNoPair) {
   const std::string advice = "; look at the edges, and set the edge detector's thresholds or this bone's width_mm";
-  marrow::EdgeMap edges = no_edges();
+  EdgeMap edges = no_edges();
   draw(edges, {240, 20}, {240, 400}, kRight);  // the canal's polarity
   draw(edges, {275, 20}, {275, 400}, kLeft);
   EXPECT_EQ(message_of([&] { find_shaft(edges, empty_view()); }),
@@ -120,7 +115,7 @@ TEST_P(DrawnShaft, SaysWhyThereIsNoPair) {
             "view 'frontal': no shaft pair found: 2 lines, best candidate rejected because only 0 mm of its borders "
             "are clear enough for bone, of 25 mm wanted; muscle's are as faint (29.9 mm wide)" +
                 advice);
-  marrow::View rims = empty_view();  // two dark things with something bright between them
+  View rims = empty_view();  // two dark things with something bright between them
   rims.image.pixels.colRange(200, 212) = 800;
   rims.image.pixels.colRange(212, 273) = 1500;
   rims.image.pixels.colRange(273, 285) = 800;
@@ -148,4 +143,4 @@ TEST_P(DrawnShaft, SaysWhyThereIsNoPair) {
             "view 'frontal': no shaft pair found: 1 lines, none of which run side by side" + advice);
 }
 
-}  // namespace drawn_test
+}  // namespace marrow::test::drawn_test

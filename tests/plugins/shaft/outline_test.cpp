@@ -1,15 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "marrow/shaft/outline.hpp"
-
-#include <gtest/gtest.h>
-
-#include <cmath>
 #include <opencv2/imgproc.hpp>
-#include <random>
 
-namespace outline_test {
+#include "marrow/shaft/outline.hpp"
+#include "tests/harness/node_test.hpp"
 
-using namespace marrow::shaft;
+namespace marrow::test::outline_test {
+
+using namespace shaft;
 
 constexpr double kPixel_mm = 0.35, kWidth_px = 80, kLeft = 150.3;
 
@@ -32,9 +29,9 @@ cv::Mat image(double blur_px, double per_px = 0.01) {
 }
 
 struct Found {
-  marrow::EdgeMap edges{400, 400, {}};
+  EdgeMap edges{400, 400, {}};
   Border border;
-  Stretch stretch{Eigen::Vector2d::UnitY(), 50, 350};
+  Stretch stretch{Vector2d::UnitY(), 50, 350};
 };
 
 /// Edges of the left border, so far inside its outline.
@@ -68,4 +65,4 @@ TEST(Outline, IsNotMadeUp) {
                                        kPixel_mm));  // no edges
 }
 
-}  // namespace outline_test
+}  // namespace marrow::test::outline_test

@@ -1,9 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Shafts in radiographs, from edges as edges.adaptive_relaxation finds them.
-#include <gtest/gtest.h>
-
 #include <chrono>
-#include <cmath>
 #include <cstdio>
 #include <filesystem>
 #include <opencv2/imgcodecs.hpp>
@@ -11,25 +8,24 @@
 #include "tests/plugins/initial/tube.hpp"
 #include "tests/plugins/shaft/scenes.hpp"
 
-namespace radiograph_test {
+namespace marrow::test::radiograph_test {
 
-using marrow::ShaftLines;
 using scenes::Shaft;
 
-marrow::EdgeMap find_edges(const marrow::View& view) {
-  return shipped::call("edges.adaptive_relaxation", {{"view", shipped::item(view)}}).at("edges").as<marrow::EdgeMap>();
+EdgeMap find_edges(const View& view) {
+  return output<EdgeMap>("edges.adaptive_relaxation", "edges", {{"view", item(view)}});
 }
 
 /// Angle and offset of the plane that two borders span against the exact one.
-void check_against_truth(const ShaftLines& lines, const marrow::View& view, const radiograph::Cylinder& bone) {
+void check_against_truth(const ShaftLines& lines, const View& view, const radiograph::Cylinder& bone) {
   const auto exact = tube::borders(view.camera, bone.point, bone.direction, bone.radius_mm, 100, 400);
   for (const auto& [found, truth] : {std::pair(lines.left, exact.left), std::pair(lines.right, exact.right)}) {
-    const Eigen::Vector2d a = found.to_px - found.from_px, b = truth.to_px - truth.from_px;
-    EXPECT_LT(marrow::degrees(std::abs(std::atan2(a.x() * b.y() - a.y() * b.x(), a.dot(b)))), 0.15);
+    const Vector2d a = found.to_px - found.from_px, b = truth.to_px - truth.from_px;
+    EXPECT_LT(degrees(std::abs(std::atan2(a.x() * b.y() - a.y() * b.x(), a.dot(b)))), 0.15);
   }
   const auto middle = [](const ShaftLines& s, double v) {
     double sum = 0;
-    for (const marrow::LineSegment* border : {&s.left, &s.right})
+    for (const LineSegment* border : {&s.left, &s.right})
       sum += border->from_px.x() + (v - border->from_px.y()) / (border->to_px.y() - border->from_px.y()) *
                                        (border->to_px.x() - border->from_px.x());
     return sum / 2;
@@ -44,9 +40,9 @@ TEST_P(Shaft, FindsTheShaftOfARadiographAndRejectsCanalAndThigh) {
   for (double photons : {1000.0, 5000.0, 0.0})
     for (double angle : {0.0, 90.0}) {
       const auto scene = radiograph::shaft({5, 3, 0}, {0.08, -0.05, 1});
-      const marrow::View view =
+      const View view =
           radiograph::image(angle == 0 ? "frontal" : "lateral", radiograph::camera(angle), scene, photons, 11);
-      const marrow::EdgeMap edges = find_edges(view);
+      const EdgeMap edges = find_edges(view);
       const auto before = std::chrono::steady_clock::now();
       const ShaftLines lines = find_shaft(edges, view);
       std::printf("%.0f photons: %.1f ms\n", photons,
@@ -70,7 +66,7 @@ TEST_P(Shaft, FindsTheShaftOfARadiographAndRejectsCanalAndThigh) {
 
 TEST_P(Shaft, FindsTheShaftOfAThighThatLiesAslant) {
   const auto scene = radiograph::shaft({5, 3, 0}, {0.8, 0.05, 1});
-  const marrow::View view = radiograph::image("frontal", radiograph::camera(0), scene, 5000, 11);
+  const View view = radiograph::image("frontal", radiograph::camera(0), scene, 5000, 11);
   check_against_truth(find_shaft(find_edges(view), view), view, scene.cylinders[1]);
 }
 
@@ -79,18 +75,18 @@ TEST_P(Shaft, FindsTheShaftOfAThighThatLiesAslant) {
 TEST_P(Shaft, FindsTheFemurOfARealKnee) {
   const std::string path = MARROW_SOURCE_DIR "/../shared/data/knee/images/L_Hop_Cam2_001_UND.0138.tif";
   if (!std::filesystem::exists(path)) GTEST_SKIP() << "the real knee is not here: " << path;
-  marrow::View view;
+  View view;
   view.name = "cam02";
   view.image.pixels = cv::imread(path, cv::IMREAD_GRAYSCALE);
   view.camera.width_px = view.image.width();
   view.camera.height_px = view.image.height();
   view.camera.intrinsics << 8700, 0, 880, 0, 8700, 880, 0, 0, 1;  // about 0.158 mm a pixel at 1370 mm
   const ShaftLines lines = find_shaft(find_edges(view), view, {{"source_to_shaft_mm", 1370.0}});
-  const auto angle_deg = [](const marrow::LineSegment& s) {
-    return marrow::degrees(std::atan2(s.to_px.y() - s.from_px.y(), s.to_px.x() - s.from_px.x()));
+  const auto angle_deg = [](const LineSegment& s) {
+    return degrees(std::atan2(s.to_px.y() - s.from_px.y(), s.to_px.x() - s.from_px.x()));
   };
-  const auto distance_px = [](const marrow::LineSegment& s, const Eigen::Vector2d& point) {
-    const Eigen::Vector2d along = (s.to_px - s.from_px).normalized();
+  const auto distance_px = [](const LineSegment& s, const Vector2d& point) {
+    const Vector2d along = (s.to_px - s.from_px).normalized();
     return std::abs(along.x() * (point - s.from_px).y() - along.y() * (point - s.from_px).x());
   };
   std::printf("knee: width %.1f +- %.1f mm, borders at %.1f and %.1f deg\n", lines.width_mm, lines.width_deviation_mm,
@@ -101,4 +97,4 @@ TEST_P(Shaft, FindsTheFemurOfARealKnee) {
   EXPECT_LT(distance_px(lines.right, {259, 982}), 12);
 }
 
-}  // namespace radiograph_test
+}  // namespace marrow::test::radiograph_test

@@ -1,11 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "marrow/shaft/widths.hpp"
+#include "tests/harness/node_test.hpp"
 
-#include <gtest/gtest.h>
+namespace marrow::test::widths_test {
 
-namespace widths_test {
-
-using marrow::shaft::Widths;
+using shaft::Widths;
 
 TEST(Widths, OfAFemurGoWithItsTaper) {
   const Widths femur({}, {}, 0);
@@ -35,4 +34,4 @@ TEST(Widths, MayBeThoseOfAnotherBone) {
   EXPECT_THROW(Widths({25, 30}, {2}, 0), std::out_of_range) << "nothing is read past the end of a list";
 }
 
-}  // namespace widths_test
+}  // namespace marrow::test::widths_test

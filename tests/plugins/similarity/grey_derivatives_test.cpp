@@ -1,90 +1,69 @@
 // SPDX-License-Identifier: Apache-2.0
 // The derivatives of the costs that compare grey values, against differences of their values.
-#include <marrow/domain/functions.hpp>
-#include <marrow/domain/pose.hpp>
-
 #include "marrow/domain/decompositions.hpp"
 #include "marrow/toolbox/match/views_cost.hpp"
 #include "tests/plugins/similarity/blob_scene.hpp"
 
-namespace grey_derivatives_test {
+namespace marrow::test::grey_derivatives_test {
 
 using namespace blob_scene;
-using marrow::FragmentFrame;
-using marrow::Vector6d;
+
+struct Blob {
+  double x, y, z, height, width;
+};
+constexpr Blob kBlobs[] = {{-6, -4, 5, 40, 9}, {9, 6, -20, 25, 6}, {-12, 12, 30, 20, 7}, {6, -15, -10, 15, 8}};
 
 /// Blobs in space, each seen as a blob around its projection.
-class BlobsInSpace : public pixelwise_projector::PixelwiseProjector {
+double blobs_in_space(const Vector2d& pixel, const RigidTransform& pose) {
+  double sum = 0;
+  for (const auto& [x, y, z, height, width] : kBlobs) {
+    const Vector3d seen = pose * Vector3d(x, y, z) + Vector3d(0, 0, 600);
+    const Vector2d at(100 + 1000 * seen.x() / seen.z(), 85 + 1000 * seen.y() / seen.z());
+    sum += height * std::exp(-0.5 * (pixel - at).squaredNorm() / (width * width));
+  }
+  return sum;
+}
+class BlobsInSpace : public DrawnRadiograph {
  public:
-  PixelGrid region(const Camera&, const RigidTransform&) const override { return {45, 40, 1, 100, 85}; }
-  std::optional<marrow::RadiographExpansion> expansion(const Camera& camera, const RigidTransform& pose,
-                                                       const FragmentFrame& frame,
-                                                       const PixelGrid& grid) const override {
+  BlobsInSpace() : DrawnRadiograph(PixelGrid{45, 40, 1, 100, 85}, blobs_in_space) {}
+  std::optional<RadiographExpansion> expansion(const Camera& camera, const RigidTransform& pose,
+                                               const FragmentFrame& frame, const PixelGrid& grid) const override {
     constexpr double kStep = 1e-4;
-    marrow::RadiographExpansion expansion{radiograph(camera, pose, grid), {}};
+    RadiographExpansion expansion{radiograph(camera, pose, grid), {}};
     for (int k = 0; k < 6; ++k) {
-      const RigidTransform above = moved(pose, frame, kStep * Vector6d::Unit(k)),
-                           below = moved(pose, frame, -kStep * Vector6d::Unit(k));
+      const RigidTransform above = marrow::moved(pose, frame, kStep * Vector6d::Unit(k)),
+                           below = marrow::moved(pose, frame, -kStep * Vector6d::Unit(k));
       for (int row = 0; row < grid.rows; ++row)
-        for (int column = 0; column < grid.columns; ++column) {
-          const Eigen::Vector2d pixel = grid.pixel(column, row);
-          expansion.slopes[std::size_t(k)].push_back(
-              float((integral(pixel, above) - integral(pixel, below)) / (2 * kStep)));
-        }
+        for (int column = 0; column < grid.columns; ++column)
+          expansion.slopes[std::size_t(k)].push_back(float(
+              (integral(grid.pixel(column, row), above) - integral(grid.pixel(column, row), below)) / (2 * kStep)));
     }
     return expansion;
   }
-
- protected:
-  double integral(const Eigen::Vector2d& pixel, const RigidTransform& pose) const override {
-    double sum = 0;
-    for (const auto& [x, y, z, height, width] : kBlobs) {
-      const Eigen::Vector3d seen = pose * Eigen::Vector3d(x, y, z) + Eigen::Vector3d(0, 0, 600);
-      const Eigen::Vector2d at(100 + 1000 * seen.x() / seen.z(), 85 + 1000 * seen.y() / seen.z());
-      sum += height * std::exp(-0.5 * (pixel - at).squaredNorm() / (width * width));
-    }
-    return sum;
-  }
-
- private:
-  struct Blob {
-    double x, y, z, height, width;
-  };
-  static constexpr Blob kBlobs[] = {{-6, -4, 5, 40, 9}, {9, 6, -20, 25, 6}, {-12, 12, 30, 20, 7}, {6, -15, -10, 15, 8}};
 };
 
 /// The blobs where they are, in soft tissue and noise, with a part that is masked.
 View seen_view() {
-  View view = view_of();
-  const BlobsInSpace blobs;
-  const std::vector<float> values = blobs.radiograph(view.camera, at(0, 0), PixelGrid{0, 0, 1, 200, 170});
   std::mt19937 random(5);
-  for (int v = 0; v < 170; ++v)
-    for (int u = 0; u < 200; ++u) {
-      const double tissue = 0.8 + 0.3 * std::sin(0.02 * u) + 0.2 * std::cos(0.03 * v),
-                   noise = 300 * (double(random()) / 4294967296.0 - 0.5);
-      view.image.pixels.at<std::uint16_t>(v, u) =
-          std::uint16_t(40000 * std::exp(-tissue - 0.02 * values[std::size_t(200 * v + u)]) + noise);
-    }
-  view.mask = cv::Mat(170, 200, CV_8U, cv::Scalar(255));
-  view.mask(cv::Rect(60, 60, 12, 9)) = 0;
-  return view;
+  const cv::Mat pixels = image_of<std::uint16_t>(kWidth_px, kHeight_px, [&](int u, int v) {
+    const double tissue = 0.8 + 0.3 * std::sin(0.02 * u) + 0.2 * std::cos(0.03 * v),
+                 noise = 300 * (double(random()) / 4294967296.0 - 0.5);
+    return 40000 * std::exp(-tissue - 0.02 * double(float(blobs_in_space(Vector2d(u, v), at(0, 0))))) + noise;
+  });
+  return test::view_of("frontal", camera(), pixels, mask_of(camera(), {60, 60, 12, 9}, false));
 }
 
 std::shared_ptr<const Cost> cost_of(const std::string& node) {
-  static const auto projector = std::make_shared<const BlobsInSpace>();
-  List<View> views = views_of(seen_view());
   View other = seen_view();
   other.name = "lateral";
   other.camera.intrinsics(0, 2) += 3;
-  views.add(other.name, other);
-  const shipped::Inputs inputs{{"projector", marrow::Value::of<RadiographProjector>(projector)},
-                               {"views", shipped::list(views, "view")}};
-  return std::static_pointer_cast<const Cost>(shipped::call("similarity." + node, inputs).at("cost").data);
+  return cost_by("similarity." + node,
+                 {{"projector", function<RadiographProjector>(std::make_shared<const BlobsInSpace>())},
+                  {"views", each_view(seen_view(), other)}});
 }
 
 /// A frame that is turned and lies beside the model's origin.
-FragmentFrame frame() { return {{4, -7, 12}, marrow::rotation_from_vector({0.3, -0.5, 0.8})}; }
+FragmentFrame frame() { return {{4, -7, 12}, rotation_from_vector({0.3, -0.5, 0.8})}; }
 const std::vector<Vector6d>& motions() {
   static const std::vector<Vector6d> all{Vector6d{0, 0, 0, 0, 0, 0}, Vector6d{0.02, -0.01, 0.04, 1.2, -0.7, 3},
                                          Vector6d{-0.05, 0.03, -0.02, -2, 1.5, -6},
@@ -123,13 +102,13 @@ TEST_P(GreyDerivatives, AreThoseOfTheValue) {
     EXPECT_LT(in_mm(about->gradient - expected).norm(), 1e-3 * in_mm(expected).norm() + 1e-6)
         << about->gradient.transpose() << "\n"
         << expected.transpose();
-    EXPECT_GT(marrow::eigen_of_symmetric(about->curvature).values[0], -1e-9);
+    EXPECT_GT(eigen_of_symmetric(about->curvature).values[0], -1e-9);
   }
 }
 
 TEST_P(GreyDerivatives, OfSingleViews) {
   const auto cost = cost_of(GetParam());
-  const auto* in_views = dynamic_cast<const marrow::match::ViewsCost*>(cost.get());
+  const auto* in_views = dynamic_cast<const match::ViewsCost*>(cost.get());
   ASSERT_TRUE(in_views);
   const RigidTransform pose = moved(at(0, 0), frame(), motions()[1]);
   Vector6d mean = Vector6d::Zero();
@@ -149,10 +128,10 @@ TEST_P(GreyDerivatives, WithoutEachBlock) {
   if (std::string(GetParam()) == "mutual_information") GTEST_SKIP() << "it has no blocks";
   const auto cost = cost_of(GetParam());
   const RigidTransform pose = moved(at(0, 0), frame(), motions()[1]);
-  const std::vector<double> values = cost->without_each_block(pose);
+  const Numbers values = cost->without_each_block(pose);
   const std::vector<Cost::Expansion> without = cost->expansion_without_each_block(pose, frame());
   ASSERT_EQ(without.size(), values.size());
-  std::vector<std::vector<double>> above, below;
+  std::vector<Numbers> above, below;
   const auto step = [](int k) { return (k < 3 ? 1e-3 : 0.02) * Vector6d::Unit(k); };
   for (int k = 0; k < 6; ++k) {
     above.push_back(cost->without_each_block(moved(pose, frame(), step(k))));
@@ -173,4 +152,4 @@ TEST_P(GreyDerivatives, WithoutEachBlock) {
   }
 }
 
-}  // namespace grey_derivatives_test
+}  // namespace marrow::test::grey_derivatives_test

@@ -1,25 +1,21 @@
 // SPDX-License-Identifier: Apache-2.0
 // The building blocks of the measures, on patches of a few pixels, compared with values computed by hand.
 #include "marrow/similarity/intensity.hpp"
-
-#include <gtest/gtest.h>
-
-#include <cmath>
-
 #include "marrow/similarity/patches.hpp"
+#include "tests/harness/node_test.hpp"
 
-namespace intensity_test {
+namespace marrow::test::intensity_test {
 
-using marrow::match::Gradients;
-using marrow::match::Patch;
+using match::Gradients;
+using match::Patch;
 
 /// The mean correlation in squares of 4 x 4, or of 6 x 6.
 double mean_patch_correlation(Patch patch, const std::vector<float>& a, const std::vector<float>& b, int side) {
   patch.rendered = a;
   patch.seen = b;
-  marrow::match::BlockSums sums((marrow::match::Blocks()));
-  marrow::match::Tally tally(patch, 1, sums);
-  const auto measure = marrow::match::correlation_in_squares(side, [](const Patch& one) { return std::vector{one}; });
+  match::BlockSums sums((match::Blocks()));
+  match::Tally tally(patch, 1, sums);
+  const auto measure = match::correlation_in_squares(side, [](const Patch& one) { return std::vector{one}; });
   measure.add(patch, tally);
   return 1 - measure.value(sums.all());
 }
@@ -37,7 +33,7 @@ Patch ramps() {
 
 TEST(Gradients, OfARampAreItsSlopes) {
   const Patch patch = ramps();
-  const Gradients gradients = marrow::match::gradients_of(patch);
+  const Gradients gradients = match::gradients_of(patch);
   for (int v = 0; v < 4; ++v)
     for (int u = 0; u < 5; ++u) {
       const std::size_t i = patch.at(u, v);
@@ -50,7 +46,7 @@ TEST(Gradients, OfARampAreItsSlopes) {
       EXPECT_EQ(gradients.v.seen[i], is_inside ? -1 : 0);
     }
   // (2 * 10 + 3 * -1) / (2^2 + 3^2) at each of the six pixels.
-  EXPECT_NEAR(marrow::match::scale_of(gradients).value, 17.0 / 13.0, 1e-12);
+  EXPECT_NEAR(match::scale_of(gradients).value, 17.0 / 13.0, 1e-12);
 }
 
 TEST(Gradients, CountWhereAllNinePixelsDo) {
@@ -58,7 +54,7 @@ TEST(Gradients, CountWhereAllNinePixelsDo) {
     for (int u = 0; u < 5; ++u) {
       Patch patch = ramps();
       patch.counts[patch.at(u, v)] = 0;
-      const Gradients gradients = marrow::match::gradients_of(patch);
+      const Gradients gradients = match::gradients_of(patch);
       for (int row = 1; row < 3; ++row)
         for (int column = 1; column < 4; ++column)
           EXPECT_EQ(gradients.u.counts[patch.at(column, row)], std::abs(column - u) > 1 || std::abs(row - v) > 1)
@@ -68,12 +64,12 @@ TEST(Gradients, CountWhereAllNinePixelsDo) {
 
 TEST(Gradients, ScaleLeavesOutWhatDoesNotCount) {
   Patch patch = ramps();
-  Gradients gradients = marrow::match::gradients_of(patch);
+  Gradients gradients = match::gradients_of(patch);
   gradients.u.seen[patch.at(1, 1)] = 1e6f;
   gradients.u.counts[patch.at(1, 1)] = 0;
-  EXPECT_NEAR(marrow::match::scale_of(gradients).value, 17.0 / 13.0, 1e-12);
+  EXPECT_NEAR(match::scale_of(gradients).value, 17.0 / 13.0, 1e-12);
   gradients.u.counts.assign(20, 0);
-  EXPECT_EQ(marrow::match::scale_of(gradients).value, 0);
+  EXPECT_EQ(match::scale_of(gradients).value, 0);
 }
 
 TEST(Moments, OfTheValuesThatCount) {
@@ -83,16 +79,16 @@ TEST(Moments, OfTheValuesThatCount) {
   std::vector<char> counts(17, 1);
   a[16] = b[16] = odd[16] = 1e6f;
   counts[16] = 0;
-  EXPECT_NEAR(marrow::match::correlation(a, a, counts), 1, 1e-12);
-  EXPECT_NEAR(marrow::match::correlation(a, b, counts), -1, 1e-12);
+  EXPECT_NEAR(match::correlation(a, a, counts), 1, 1e-12);
+  EXPECT_NEAR(match::correlation(a, b, counts), -1, 1e-12);
   // The covariance of i and i % 2 is 1/4; the variances are 255/12 and 1/4.
-  EXPECT_NEAR(marrow::match::correlation(a, odd, counts), 0.25 / std::sqrt(255 / 12.0 * 0.25), 1e-12);
-  EXPECT_EQ(marrow::match::correlation(a, std::vector<float>(17, 5), counts), 0);
-  EXPECT_NEAR(marrow::match::deviation(a, counts), std::sqrt(255 / 12.0), 1e-12);
-  EXPECT_NEAR(marrow::match::deviation(odd, counts), 0.5, 1e-12);
+  EXPECT_NEAR(match::correlation(a, odd, counts), 0.25 / std::sqrt(255 / 12.0 * 0.25), 1e-12);
+  EXPECT_EQ(match::correlation(a, std::vector<float>(17, 5), counts), 0);
+  EXPECT_NEAR(match::deviation(a, counts), std::sqrt(255 / 12.0), 1e-12);
+  EXPECT_NEAR(match::deviation(odd, counts), 0.5, 1e-12);
   counts[3] = 0;
-  EXPECT_EQ(marrow::match::correlation(a, a, counts), 0) << "fewer than 16";
-  EXPECT_EQ(marrow::match::deviation(a, counts), 0);
+  EXPECT_EQ(match::correlation(a, a, counts), 0) << "fewer than 16";
+  EXPECT_EQ(match::deviation(a, counts), 0);
 }
 
 TEST(Patches, WeighEachSquareByItsVariance) {
@@ -132,4 +128,4 @@ TEST(Patches, AConstantRadiographSaysNothing) {
     EXPECT_EQ(mean_patch_correlation(patch, std::vector<float>(36, 1000.1f + 77.7f * float(i)), b, 6), -1) << i;
 }
 
-}  // namespace intensity_test
+}  // namespace marrow::test::intensity_test

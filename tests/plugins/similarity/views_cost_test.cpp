@@ -1,19 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 // What costs of several views share: blocks, sums, the mean over views, and the cost without each block.
 #include "marrow/toolbox/match/views_cost.hpp"
-
-#include <gtest/gtest.h>
-
 #include "marrow/similarity/block_expansions.hpp"
 #include "tests/plugins/project/shapes.hpp"
 
-namespace views_cost_test {
+namespace marrow::test::views_cost_test {
 
-using marrow::match::Blocks;
-using marrow::match::BlockSums;
+using match::Blocks;
+using match::BlockSums;
 
 TEST(Blocks, CoverTheImage) {
-  marrow::Camera camera = shapes::c_arm(0, 1000);
+  Camera camera = shapes::c_arm(0, 1000);
   camera.height_px = 300;
   const Blocks blocks = Blocks::of(camera);
   EXPECT_EQ(blocks.side_px, 125) << "an eighth of the longer side";
@@ -33,12 +30,12 @@ TEST(Blocks, CoverTheImage) {
 TEST(Blocks, AreTheSamePartsOfAnImageOfAnySize) {
   for (const int along : {5, 8, 10})
     for (const int width_px : {50, 200, 253, 383, 500, 512}) {
-      marrow::Camera camera = shapes::c_arm(0, width_px);
+      Camera camera = shapes::c_arm(0, width_px);
       camera.height_px = 3 * width_px / 5;
       const Blocks blocks = Blocks::of(camera, along);
       EXPECT_NEAR(blocks.side_px, double(width_px) / along, 0.03 * width_px / along);
       for (int times = 2; times < 16; times *= 2) {
-        marrow::Camera larger = camera;
+        Camera larger = camera;
         larger.width_px *= times;
         larger.height_px *= times;
         const Blocks same = Blocks::of(larger, along);
@@ -58,14 +55,13 @@ TEST(BlockSums, WithoutEachBlock) {
   sums.add(15, 0, 10, 1);
   EXPECT_EQ(sums.all().values, 13);
   EXPECT_EQ(sums.all().weights, 5);
-  EXPECT_EQ(sums.without_each([](const auto& left) { return left.values / left.weights; }),
-            (std::vector<double>{10, 0.75}));
+  EXPECT_EQ(sums.without_each([](const auto& left) { return left.values / left.weights; }), (Numbers{10, 0.75}));
 }
 
 TEST(BlockExpansions, WithoutEachBlock) {
-  using marrow::match::BlockExpansions;
+  using match::BlockExpansions;
   BlockExpansions first(Blocks{10, 2, 1}), second(Blocks{10, 1, 1});
-  const marrow::Vector6d along = marrow::Vector6d::Unit(3);
+  const Vector6d along = Vector6d::Unit(3);
   first.add(3, 0, along, 2, 3);
   first.add(15, 0, 2 * along, 1, 5);
   second.add(0, 0, along, -3, 1);
@@ -92,47 +88,45 @@ TEST(BlockExpansions, WithoutEachBlock) {
 }
 
 /// A cost that is 1 in the first view and 5 + x in the second. Without its single block, a view is 0.
-class Two : public marrow::match::ViewsCost {
+class Two : public match::ViewsCost {
  public:
-  explicit Two(const std::vector<double>& weights) : ViewsCost(2, weights) {}
-  double value_in_view(std::size_t view, const marrow::RigidTransform& pose) const override {
+  explicit Two(const Numbers& weights) : ViewsCost(2, weights) {}
+  double value_in_view(std::size_t view, const RigidTransform& pose) const override {
     return view == 0 ? 1 : 5 + pose.translation_mm.x();
   }
-  std::shared_ptr<const marrow::Cost> at_level(const marrow::CostLevel&) const override { return nullptr; }
+  std::shared_ptr<const Cost> at_level(const CostLevel&) const override { return nullptr; }
 
  private:
-  Split split(std::size_t view, const marrow::RigidTransform& pose) const override {
+  Split split(std::size_t view, const RigidTransform& pose) const override {
     return {value_in_view(view, pose), {0.0}};
   }
 };
 
 TEST(ViewsCost, IsTheWeightedMean) {
-  marrow::RigidTransform pose{"world", "ct"};
-  pose.translation_mm.x() = 2;
+  const RigidTransform pose = placed({2, 0, 0});
   EXPECT_EQ(Two({}).value(pose), 4);
   EXPECT_EQ(Two({3, 1}).value(pose), 2.5);
   EXPECT_EQ(Two({3, 1}).view_count(), 2u);
-  EXPECT_EQ(Two({}).without_each_block(pose), (std::vector<double>{3.5, 0.5}));
-  EXPECT_EQ(Two({3, 1}).without_each_block(pose), (std::vector<double>{1.75, 0.75}));
+  EXPECT_EQ(Two({}).without_each_block(pose), (Numbers{3.5, 0.5}));
+  EXPECT_EQ(Two({3, 1}).without_each_block(pose), (Numbers{1.75, 0.75}));
 }
 
 /// Three views. A view whose text is not empty is silent for this reason.
-class Silent : public marrow::match::ViewsCost {
+class Silent : public match::ViewsCost {
  public:
-  Silent(const std::vector<double>& weights, std::vector<std::string> silences)
-      : ViewsCost(3, weights), silences_(std::move(silences)) {}
-  double value_in_view(std::size_t, const marrow::RigidTransform&) const override { return 1; }
-  std::shared_ptr<const marrow::Cost> at_level(const marrow::CostLevel&) const override { return nullptr; }
+  Silent(const Numbers& weights, Strings silences) : ViewsCost(3, weights), silences_(std::move(silences)) {}
+  double value_in_view(std::size_t, const RigidTransform&) const override { return 1; }
+  std::shared_ptr<const Cost> at_level(const CostLevel&) const override { return nullptr; }
 
  private:
-  Split split(std::size_t, const marrow::RigidTransform&) const override { return {1, {1.0}}; }
-  std::string silence(std::size_t view, const marrow::RigidTransform&) const override { return silences_[view]; }
-  std::vector<std::string> silences_;
+  Split split(std::size_t, const RigidTransform&) const override { return {1, {1.0}}; }
+  std::string silence(std::size_t view, const RigidTransform&) const override { return silences_[view]; }
+  Strings silences_;
 };
 
 TEST(ViewsCost, SaysNothingWhereNoneOfItsViewsDoes) {
-  const marrow::RigidTransform pose{"world", "ct"};
-  using Texts = std::vector<std::string>;
+  const RigidTransform pose{"world", "ct"};
+  using Texts = Strings;
   const Silent some({}, {"a is empty", "", "c is empty"}), all({}, {"a is empty", "b is empty", "c is empty"});
   EXPECT_EQ(some.silent_views(pose), (Texts{"a is empty", "c is empty"}));
   EXPECT_EQ(some.nothing_compared(pose), "");
@@ -144,4 +138,4 @@ TEST(ViewsCost, SaysNothingWhereNoneOfItsViewsDoes) {
   EXPECT_EQ(Two({}).nothing_compared(pose), "") << "a cost that does not say";
 }
 
-}  // namespace views_cost_test
+}  // namespace marrow::test::views_cost_test

@@ -1,32 +1,25 @@
 // SPDX-License-Identifier: Apache-2.0
 // similarity.with_contact, on two balls whose distance is known.
-#include <gtest/gtest.h>
-
 #include "marrow/toolbox/analytic/body.hpp"
 #include "marrow/toolbox/field/bones_apart.hpp"
 #include "marrow/toolbox/match/among_others.hpp"
-#include "shipped.hpp"
 #include "tests/plugins/register/bowl.hpp"
 
-namespace with_contact_test {
-
-using namespace marrow;
+namespace marrow::test::with_contact_test {
 
 constexpr double kRadius_mm = 10, kBand_mm = 4, kInformation = 1e4;
 constexpr double kUnit = 2 / kInformation;  // noise_times is 2
 
-analytic::Body ball() { return {{{0, 0, 0}, Eigen::Vector3d::Constant(kRadius_mm)}}; }
+analytic::Body ball() { return {{{0, 0, 0}, Vector3d::Constant(kRadius_mm)}}; }
 std::shared_ptr<const SignedField> field() {
   static const auto kField =
       std::make_shared<const SignedField>(field_of(ball(), analytic::grid_of({61, 61, 61}, {0.5, 0.5, 0.5}), kBand_mm));
   return kField;
 }
-RigidTransform at(double x_mm) { return analytic::moved_by({0, 0, 0}, {x_mm, 0, 0}); }
-Pose pose_at(double x_mm) {
-  Pose pose;
-  pose.world_from_model = at(x_mm);
-  return pose;
-}
+RigidTransform at(double x_mm) { return placed({x_mm, 0, 0}); }
+Pose along_x(double x_mm) { return pose_of(at(x_mm)); }
+/// The images know the place to this.
+Pose known_to(const Pose& pose, double deg_and_mm) { return with_deviations(pose, Vector6d::Constant(deg_and_mm)); }
 
 /// The ball 'own', beside 'other' at the origin. The images' cost is a bowl about 20 mm whose minimum is known to 0.01
 /// degrees and mm, so a unit of the contact counts kUnit.
@@ -34,28 +27,18 @@ struct Trial {
   std::shared_ptr<const Cost> images =
       std::make_shared<well::Bowl>(at(20), FragmentFrame(), Matrix6d::Identity(), kInformation);
   std::shared_ptr<const SignedField> own = std::make_shared<const SignedField>(*field());
-  shipped::Inputs inputs;
+  Inputs inputs;
 
   Trial() {
-    Pose found = pose_at(20);
-    found.covariance = Matrix6d::Identity() * 1e-4;
-    found.covariance->topLeftCorner<3, 3>() *= radians(1) * radians(1);
     List<SignedField> fields;
     fields.add_shared("own", own);
     fields.add_shared("other", field());
-    List<Pose> poses;
-    poses.add("own", pose_at(20));
-    poses.add("other", pose_at(0));
-    inputs = {{"cost", Value::of<Cost>(images)},
-              {"found", shipped::item(found)},
-              {"model", shipped::item(mesh_of(ball()))},
-              {"field", Value::of<SignedField>(own)},
-              {"other_bones", shipped::list(fields, "fragment")},
-              {"poses", shipped::list(poses, "fragment")}};
+    inputs = {
+        {"cost", Value::of<Cost>(images)},         {"found", item(known_to(along_x(20), 0.01))},
+        {"model", item(mesh_of(ball()))},          {"field", Value::of<SignedField>(own)},
+        {"other_bones", list(fields, "fragment")}, {"poses", per_fragment("own", along_x(20), "other", along_x(0))}};
   }
-  Value cost(const shipped::Options& options = {}) const {
-    return shipped::call("similarity.with_contact", inputs, options).at("cost");
-  }
+  Value cost(const Options& options = {}) const { return call("similarity.with_contact", inputs, options).at("cost"); }
   /// What contact adds where the ball is, in units of the negative log-likelihood.
   double term(const Value& cost, double x_mm) const {
     return (cost.as<Cost>().value(at(x_mm)) - images->value(at(x_mm))) / kUnit;
@@ -63,7 +46,7 @@ struct Trial {
 };
 
 TEST(BonesApart, DepthsAndGapsOfBallsAreThoseOfTheirDistance) {
-  const std::vector<Eigen::Vector3d> surface = sample_surface(mesh_of(ball()), 8000);
+  const std::vector<Vector3d> surface = sample_surface(mesh_of(ball()), 8000);
   EXPECT_NEAR(field::deepest_mm(surface, *field(), at(17)), 3, 0.1);
   EXPECT_EQ(field::deepest_mm(surface, *field(), at(21)), 0);
   // A cap of height 3 mm whose depths are spread evenly from 0 to nearly 3: the mean of d^4 by that of d^2 is 9 * 3/5.
@@ -84,8 +67,8 @@ TEST(WithContact, CostsNothingApartAndTheSquareOfTheDepthWithin) {
 
 TEST(WithContact, AJointCostsTheSquareOfWhatItsGapIsOff) {
   const Trial trial;
-  const Value cost = trial.cost(
-      {{"joint", std::vector<std::string>{"own", "other"}}, {"joint_width_mm", 2.0}, {"joint_deviation_mm", 0.5}});
+  const Value cost =
+      trial.cost({{"joint", Strings{"own", "other"}}, {"joint_width_mm", 2.0}, {"joint_deviation_mm", 0.5}});
   // The gap counts as about 0.2 mm wider, because not only the nearest point counts.
   EXPECT_LT(trial.term(cost, 21.8), 0.1);
   EXPECT_NEAR(trial.term(cost, 20.8), 0.5 * 4, 0.4) << "two deviations too narrow";
@@ -95,9 +78,7 @@ TEST(WithContact, AJointCostsTheSquareOfWhatItsGapIsOff) {
 TEST(WithContact, FollowsTheOtherBones) {
   const Trial trial;
   const Value cost = trial.cost();
-  List<RigidTransform> others;
-  others.add("other", at(-3));
-  const auto moved = match::among_others(cost.as<Cost>(), others);
+  const auto moved = match::among_others(cost.as<Cost>(), named("other", at(-3)));
   ASSERT_TRUE(moved);
   EXPECT_NEAR(moved->value(at(16)) - trial.images->value(at(16)),
               cost.as<Cost>().value(at(19)) - trial.images->value(at(19)), 1e-12);
@@ -107,45 +88,31 @@ TEST(WithContact, KeepsAnImageCostOffTheOtherBone) {
   Trial trial;  // its images want the ball 1 mm inside the other one, and know this to about 0.6 mm
   trial.images = std::make_shared<well::Bowl>(at(19), FragmentFrame(), Matrix6d::Identity(), 1);
   trial.inputs["cost"] = Value::of<Cost>(trial.images);
-  Pose found = pose_at(19);
-  found.covariance = Matrix6d::Identity() * 0.36;
-  found.covariance->topLeftCorner<3, 3>() *= radians(1) * radians(1);
-  trial.inputs["found"] = shipped::item(found);
+  trial.inputs["found"] = item(known_to(along_x(19), 0.6));
   const Value cost = trial.cost();
   EXPECT_GT(cost.as<Cost>().value(at(19)), cost.as<Cost>().value(at(19.8)));
   EXPECT_LT(trial.images->value(at(19)), trial.images->value(at(19.8)));
 }
 
 TEST(WithContact, RefusesWhatItCannotUse) {
-  const auto refusal = [](const Trial& trial, const shipped::Options& options = {}) {
-    return shipped::refusal("similarity.with_contact", trial.inputs, options);
+  const auto refusal = [](const Inputs& more, const Options& options = {}) {
+    return shipped::refusal("similarity.with_contact", with(Trial().inputs, more), options);
   };
-  const auto joint = [](std::vector<std::string> names) { return shipped::Options{{"joint", std::move(names)}}; };
-  EXPECT_EQ(refusal(Trial(), joint({"own", "othr"})), "joint: there is no bone 'othr'; did you mean 'other'?");
-  EXPECT_EQ(refusal(Trial(), joint({"own"})), "joint names 1 bones; name the two whose gap is known, or none");
-  shipped::Options wide = joint({"own", "other"});
-  wide["joint_width_mm"] = 5.0;
-  EXPECT_EQ(refusal(Trial(), wide),
+  EXPECT_EQ(refusal({}, {{"joint", Strings{"own", "othr"}}}), "joint: there is no bone 'othr'; did you mean 'other'?");
+  EXPECT_EQ(refusal({}, {{"joint", Strings{"own"}}}), "joint names 1 bones; name the two whose gap is known, or none");
+  EXPECT_EQ(refusal({}, {{"joint", Strings{"own", "other"}}, {"joint_width_mm", 5.0}}),
             "joint_width_mm is 5, but the field of 'other' knows distances up to 4 mm only; raise band_mm of its "
             "segmentation");
-  Trial lost;
-  List<Pose> poses;
-  poses.add("own", pose_at(20));
-  lost.inputs["poses"] = shipped::list(poses, "fragment");
-  EXPECT_EQ(refusal(lost), "other_bones has 'other', but poses has none of it; give the poses of the same fragments");
-  Trial foreign;
-  Pose elsewhere = pose_at(0);
+  EXPECT_EQ(refusal({{"poses", per_fragment("own", along_x(20))}}),
+            "other_bones has 'other', but poses has none of it; give the poses of the same fragments");
+  Pose elsewhere;
   elsewhere.world_from_model.source = "bone";
-  poses.add("other", elsewhere);
-  foreign.inputs["poses"] = shipped::list(poses, "fragment");
-  EXPECT_EQ(refusal(foreign),
+  EXPECT_EQ(refusal({{"poses", per_fragment("own", along_x(20), "other", elsewhere)}}),
             "other_bones: 'other' is in frame 'ct', but its pose takes 'bone'; give the field of the bone that was "
             "registered");
-  Trial unknown;
-  unknown.inputs["found"] = shipped::item(pose_at(20));
-  EXPECT_EQ(refusal(unknown),
+  EXPECT_EQ(refusal({{"found", item(along_x(20))}}),
             "the pose found by the images has no covariance; take it from a registration by a cost of the kind "
             "similarity, which predicts one");
 }
 
-}  // namespace with_contact_test
+}  // namespace marrow::test::with_contact_test

@@ -1,8 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 // Bodies in the beam and in the CT, and the node that adds them.
-#include <gtest/gtest.h>
-#include <tbb/global_control.h>
-
 #include <marrow/domain/random.hpp>
 
 #include "marrow/simulate/knee.hpp"
@@ -11,84 +8,56 @@
 #include "marrow/simulate/thigh.hpp"
 #include "marrow/toolbox/phantom/loft.hpp"
 #include "marrow/toolbox/phantom/materials.hpp"
-#include "nodes.hpp"
-#include "shapes.hpp"
+#include "tests/plugins/simulate/phantoms.hpp"
 
-namespace clutter_test {
+namespace marrow::test::clutter_test {
 
-using namespace marrow;
-using phantom::Body;
-using phantom::ClutteredPhantom;
-using phantom::Phantom;
-namespace test = phantom::test;
-
-Body body(const std::string& material, Mesh surface) {
-  Body made;
-  made.name = "thing";
-  made.material = material;
-  made.surface = std::move(surface);
-  return made;
-}
+using namespace simulated;
 
 /// A small bone far from the middle of the image, without soft tissue.
-Phantom nothing() { return test::whole(test::box({-2, -2, -80}, {2, 2, -76})); }
+Phantom nothing() { return whole(box_between({-2, -2, -80}, {2, 2, -76})); }
 
+Inputs in_beam(const ClutteredPhantom& phantom, int size_px = 129) {
+  return {{"phantom", item(phantom)}, {"cameras", per_view("frontal", camera(0, size_px))}};
+}
 View exposed(const ClutteredPhantom& phantom, int size_px = 129, double photons = 0, std::uint64_t seed = 1) {
-  List<Camera> cameras;
-  cameras.add("frontal", test::camera(0, size_px));
-  return shipped::call("simulate.cluttered_fluoroscopy",
-                       {{"phantom", shipped::item(phantom)}, {"cameras", shipped::list(cameras, "view")}},
-                       {{"photons", photons}, {"blur_px", 0.0}, {"scatter_to_primary", 0.0}}, Context(seed))
-      .at("views")
-      .as_list<View>()[0];
+  return output_list<View>("simulate.cluttered_fluoroscopy", "views", in_beam(phantom, size_px),
+                           {{"photons", photons}, {"blur_px", 0.0}, {"scatter_to_primary", 0.0}}, Context(seed))[0];
+}
+Volume scanned(const ClutteredPhantom& phantom, const Options& options, std::uint64_t seed = 0) {
+  return output<Volume>("simulate.cluttered_ct", "volume", {{"phantom", item(phantom)}}, options, Context(seed));
 }
 
-Volume scanned(const ClutteredPhantom& phantom, const shipped::Options& options, std::uint64_t seed = 0) {
-  return shipped::call("simulate.cluttered_ct", {{"phantom", shipped::item(phantom)}}, options, Context(seed))
-      .at("volume")
-      .as<Volume>();
-}
-
-int grey(const View& view, int u, int v) { return view.image.pixels.at<std::uint16_t>(v, u); }
-
-float at(const Volume& volume, const Eigen::Vector3d& point) {
-  return sample_trilinear(volume.grid, volume.values, volume.grid.index_from_point(point));
-}
-
-shipped::Options all_at(const std::string& level) {
-  shipped::Options options;
+Options all_at(const std::string& level) {
+  Options options;
   for (const char* name : {"knee", "fat", "folds", "vessels", "pin", "plate", "cable", "clamp", "table", "lag"})
     options[name] = level;
   return options;
 }
 
-Phantom broken_femur(const shipped::Options& options = {}) {
-  shipped::Options all{{"resolution_mm", 2.0}};
-  all.insert(options.begin(), options.end());
-  return simulated::fracture(simulated::femur(all), {{"rotation_deg", std::vector<double>{3, -4, 8}}});
-}
 const Phantom& broken() {
-  static const Phantom made = broken_femur();
+  static const Phantom made = fracture(femur({{"resolution_mm", 2.0}}), {{"rotation_deg", Numbers{3, -4, 8}}});
   return made;
 }
-
-ClutteredPhantom cluttered(const Phantom& phantom, const shipped::Options& options) {
-  return shipped::call("simulate.clutter", {{"phantom", shipped::item(phantom)}}, options)
-      .at("phantom")
-      .as<ClutteredPhantom>();
+const ClutteredPhantom& usual() {
+  static const ClutteredPhantom made = cluttered(broken(), all_at("usual"));
+  return made;
+}
+/// All bodies in the beam.
+std::vector<Body> all_bodies(const ClutteredPhantom& phantom) {
+  std::vector<Body> all = phantom.tissues;
+  all.insert(all.end(), phantom.bodies.begin(), phantom.bodies.end());
+  return all;
 }
 
-TEST(SimulateClutter, SteelWeakensTheBeamByBeersLaw) {
+TEST(SimulateClutter, MetalWeakensTheBeamByBeersLaw) {
   // 2 mm of steel: 0.40 exp(-5.734) + 0.33 exp(-3.094) + 0.20 exp(-1.904) + 0.07 exp(-1.304) = 0.06502. The rays of
   // the middle pixel lie 0.15 mm beside the axis at most, where the chord is 1 % shorter.
-  const ClutteredPhantom phantom{nothing(), {}, {body("steel", phantom::tube({0, 0, -40}, {0, 0, 40}, 1, 720))}};
-  EXPECT_NEAR(grey(exposed(phantom, 513), 256, 256) / 12000.0, 0.06502, 0.0012);
-}
-
-TEST(SimulateClutter, APlateIsAsThickAsItSays) {
+  const ClutteredPhantom rod{nothing(), {}, {body("steel", phantom::tube({0, 0, -40}, {0, 0, 40}, 1, 720))}};
+  EXPECT_NEAR(grey(exposed(rod, 513), 256, 256) / 12000.0, 0.06502, 0.0012);
   // 4.5 mm of titanium along the beam: 0.40 exp(-4.4933) + 0.33 exp(-2.4620) + 0.20 exp(-1.5548) + 0.07 exp(-1.1052)
   // = 0.004474 + 0.028136 + 0.042246 + 0.023181.
-  const Mesh plate = phantom::bar({{0, 0, -40}, {0, 0, 40}}, Eigen::Vector3d::UnitY(), 14, 4.5);
+  const Mesh plate = phantom::bar({{0, 0, -40}, {0, 0, 40}}, Vector3d::UnitY(), 14, 4.5);
   EXPECT_NEAR(enclosed_volume_mm3(plate), 14 * 4.5 * 80, 1e-6);
   EXPECT_NEAR(grey(exposed({nothing(), {}, {body("titanium", plate)}}), 64, 64) / 12000.0, 0.098037, 0.0003);
 }
@@ -111,13 +80,10 @@ TEST(SimulateClutter, ALaterBodyReplacesWhatItOverlaps) {
   EXPECT_EQ(parts,
             (std::vector<std::array<double, 3>>{{0, 2, 1}, {2, 4, 3}, {4, 5, 3}, {5, 7, 2}, {7, 10, 1}, {12, 14, 1}}));
   // A hollow of plastic in steel in bone in muscle: each replaces a length of what surrounds it.
-  Phantom inside = test::whole(test::box({-30, -20, -30}, {30, 20, 30}));
-  inside.bone.thigh_radius_mm = 80;
-  inside.bone.fat_mm = 10;
-  const ClutteredPhantom phantom{inside,
+  const ClutteredPhantom phantom{whole(box_between({-30, -20, -30}, {30, 20, 30}), {}, 80, 10),
                                  {},
-                                 {body("steel", test::box({-30, -1, -30}, {30, 1, 30})),
-                                  body("plastic", test::box({-30, -0.5, -30}, {30, 0.5, 30}))}};
+                                 {body("steel", box_between({-30, -1, -30}, {30, 1, 30})),
+                                  body("plastic", box_between({-30, -0.5, -30}, {30, 0.5, 30}))}};
   const phantom::Spectrum steel = phantom::material("steel").per_mm, plastic = phantom::material("plastic").per_mm;
   const std::array<double, 4> share{0.40, 0.33, 0.20, 0.07};
   double expected = 0, tissue = 0;
@@ -131,7 +97,7 @@ TEST(SimulateClutter, ALaterBodyReplacesWhatItOverlaps) {
 }
 
 TEST(SimulateClutter, UnevenFatIsMovedNotAdded) {
-  phantom::Bone bone = broken().bone;
+  const Bone& bone = broken().bone;
   marrow::Random first(5), second(5);
   const auto even = phantom::make_thigh(bone, {}, first),
              uneven = phantom::make_thigh(bone, {.unevenness = 0.8}, second);
@@ -155,12 +121,12 @@ TEST(SimulateClutter, UnevenFatIsMovedNotAdded) {
 }
 
 TEST(SimulateClutter, NothingChangesWhenAllIsOff) {
-  const ClutteredPhantom same = cluttered(broken(), {});
-  EXPECT_TRUE(same.tissues.empty());
-  EXPECT_TRUE(same.bodies.empty());
-  const shipped::Options options{{"noise_hu", 0.0}, {"range_mm", std::vector<double>{20, 40}}};
-  EXPECT_EQ(scanned(same, options).values, simulated::ct(broken(), options).values);
-  EXPECT_EQ(shipped::call("simulate.clutter", {{"phantom", shipped::item(broken())}}).count("earlier"), 1u);
+  const Outputs made = call("simulate.clutter", {{"phantom", item(broken())}});
+  EXPECT_EQ(made.count("earlier"), 1u);
+  const auto& same = made.at("phantom").as<ClutteredPhantom>();
+  EXPECT_TRUE(same.tissues.empty() && same.bodies.empty());
+  const Options options{{"noise_hu", 0.0}, {"range_mm", Numbers{20, 40}}};
+  EXPECT_EQ(scanned(same, options).values, ct(broken(), options).values);
 }
 
 TEST(SimulateClutter, EachLevelAddsItsBodies) {
@@ -168,8 +134,7 @@ TEST(SimulateClutter, EachLevelAddsItsBodies) {
     const ClutteredPhantom phantom = cluttered(broken(), all_at(level));
     phantom::check_phantom(phantom, level);  // closed, oriented, of known materials
     std::map<std::string, int> count;
-    for (const auto* bodies : {&phantom.tissues, &phantom.bodies})
-      for (const Body& one : *bodies) ++count[one.name];
+    for (const Body& one : all_bodies(phantom)) ++count[one.name];
     for (const char* name : {"skin", "muscle", "artery", "tibia", "tibia, inside", "fibula", "patella", "plate",
                              "screw", "clamp", "rod", "table's edge", "pin", "cable", "vein"})
       EXPECT_GE(count[name], 1) << name << " " << level;
@@ -179,9 +144,8 @@ TEST(SimulateClutter, EachLevelAddsItsBodies) {
 }
 
 TEST(SimulateClutter, WhatIsFixedToTheFragmentMovesWithIt) {
-  const ClutteredPhantom phantom = cluttered(broken(), all_at("usual"));
-  const phantom::Fragment& distal = phantom.phantom.fragments[1];
-  for (const Body& one : phantom.bodies) {
+  const Fragment& distal = usual().phantom.fragments[1];
+  for (const Body& one : usual().bodies) {
     const bool is_fixed = one.name == "plate" || one.name == "screw" || one.name == "pin" ||
                           one.name.starts_with("tibia") || one.name.starts_with("fibula") ||
                           one.name.starts_with("patella");
@@ -189,7 +153,7 @@ TEST(SimulateClutter, WhatIsFixedToTheFragmentMovesWithIt) {
     if (one.name != "plate" && one.name != "screw") continue;
     EXPECT_TRUE(one.in_ct);
     const RigidTransform still = distal.world_from_ct * one.ct_from_world;
-    EXPECT_NEAR((still.rotation - Eigen::Matrix3d::Identity()).norm() + still.translation_mm.norm(), 0, 1e-9);
+    EXPECT_NEAR((still.rotation - Matrix3d::Identity()).norm() + still.translation_mm.norm(), 0, 1e-9);
   }
 }
 
@@ -217,157 +181,132 @@ TEST(SimulateClutter, TheKneeHasTheFemursSizeAndNeitherTouchesIt) {
 
 TEST(SimulateClutter, PlacesDependOnTheSeedAlone) {
   const auto made = [&](int seed, std::size_t threads) {
-    tbb::global_control control(tbb::global_control::max_allowed_parallelism, threads);
-    shipped::Options options = all_at("usual");
-    options["clutter_seed"] = seed;
-    std::vector<Eigen::Vector3d> vertices;
-    const ClutteredPhantom phantom = cluttered(broken(), options);
-    for (const auto* bodies : {&phantom.tissues, &phantom.bodies})
-      for (const Body& one : *bodies)
+    return with_threads(threads, [&] {
+      std::vector<Vector3d> vertices;
+      for (const Body& one : all_bodies(cluttered(broken(), with(all_at("usual"), {{"clutter_seed", seed}}))))
         vertices.insert(vertices.end(), one.surface.vertices_mm.begin(), one.surface.vertices_mm.end());
-    return vertices;
+      return vertices;
+    });
   };
   const auto one = made(3, 1);
   EXPECT_EQ(one, made(3, 2));
   EXPECT_NE(one, made(4, 2));
   // A level does not move what another one adds.
-  const auto plate = [&](const shipped::Options& options) {
-    for (const Body& one : cluttered(broken(), options).bodies)
+  const auto plate = [](const ClutteredPhantom& phantom) {
+    for (const Body& one : phantom.bodies)
       if (one.name == "plate") return one.surface.vertices_mm;
-    return std::vector<Eigen::Vector3d>();
+    return std::vector<Vector3d>();
   };
-  EXPECT_EQ(plate({{"plate", std::string("usual")}}), plate(all_at("usual")));
+  EXPECT_EQ(plate(cluttered(broken(), {{"plate", std::string("usual")}})), plate(usual()));
 }
 
 TEST(SimulateClutter, ImagesAndCtAreTheSameAtAnyNumberOfThreads) {
-  const ClutteredPhantom phantom = cluttered(broken(), all_at("usual"));
-  const auto pixels = [&](std::size_t threads) {
-    tbb::global_control control(tbb::global_control::max_allowed_parallelism, threads);
-    const View view = exposed(phantom, 96, 2000, 7);
-    return std::vector<std::uint16_t>(view.image.pixels.begin<std::uint16_t>(), view.image.pixels.end<std::uint16_t>());
+  const auto image = [](std::size_t threads) {
+    return with_threads(threads, [] { return exposed(usual(), 96, 2000, 7); });
   };
-  EXPECT_EQ(pixels(1), pixels(2));
-  const auto values = [&](std::size_t threads) {
-    tbb::global_control control(tbb::global_control::max_allowed_parallelism, threads);
-    return scanned(phantom,
-                   {{"spacing_mm", std::vector<double>{1.6, 1.6, 4}}, {"range_mm", std::vector<double>{0, 80}}}, 7)
-        .values;
+  EXPECT_TRUE(same(image(1), image(2)));
+  const auto values = [](std::size_t threads) {
+    return with_threads(threads, [] {
+      return scanned(usual(), {{"spacing_mm", Numbers{1.6, 1.6, 4}}, {"range_mm", Numbers{0, 80}}}, 7).values;
+    });
   };
   EXPECT_EQ(values(1), values(2));
 }
 
 TEST(SimulateClutter, TheEarlierFrameShowsTheFragmentElsewhere) {
-  const auto outputs = shipped::call("simulate.clutter", {{"phantom", shipped::item(broken())}}, all_at("usual"));
-  const auto now = outputs.at("phantom").as<ClutteredPhantom>(), before = outputs.at("earlier").as<ClutteredPhantom>();
-  const Eigen::Vector3d shift =
+  const auto before =
+      output<ClutteredPhantom>("simulate.clutter", "earlier", {{"phantom", item(broken())}}, all_at("usual"));
+  const ClutteredPhantom& now = usual();
+  const Vector3d shift =
       before.phantom.fragments[1].world_from_ct.translation_mm - now.phantom.fragments[1].world_from_ct.translation_mm;
   EXPECT_NEAR(shift.norm(), 3, 1e-9);
   EXPECT_EQ(before.phantom.fragments[0].world_from_ct.translation_mm,
             now.phantom.fragments[0].world_from_ct.translation_mm);
   for (std::size_t i = 0; i < now.bodies.size(); ++i) {
-    const Eigen::Vector3d moved = before.bodies[i].surface.vertices_mm[0] - now.bodies[i].surface.vertices_mm[0];
-    EXPECT_NEAR((moved - (now.bodies[i].moves_with.empty() ? Eigen::Vector3d::Zero().eval() : shift)).norm(), 0, 1e-9);
+    const Vector3d moved = before.bodies[i].surface.vertices_mm[0] - now.bodies[i].surface.vertices_mm[0];
+    EXPECT_NEAR((moved - (now.bodies[i].moves_with.empty() ? Vector3d::Zero().eval() : shift)).norm(), 0, 1e-9);
   }
 }
 
 TEST(SimulateClutter, TheCtShowsWhatIsInThePatient) {
-  Phantom bone = test::whole(test::box({-15, -15, 0}, {15, 15, 60}));
-  bone.bone.thigh_radius_mm = 30;
-  bone.bone.fat_mm = 6;
+  const Phantom bone = whole(box_between({-15, -15, 0}, {15, 15, 60}), {}, 30, 6);
   Body tissue = body("fat", phantom::tube({0, 0, -100}, {0, 0, 200}, 30, 240));
   Body muscle = body("muscle", phantom::tube({0, 0, -100}, {0, 0, 200}, 20, 240));
-  Body marker = body("plastic", test::box({0, 0, 0}, {8, 8, 8})), outside = marker;
+  Body marker = body("plastic", box_between({0, 0, 0}, {8, 8, 8})), outside = marker;
   tissue.in_ct = muscle.in_ct = marker.in_ct = true;
   marker.ct_from_world.translation_mm = {0, 0, 30};
-  outside.surface = test::box({-10, -10, 10}, {-2, -2, 18});
+  outside.surface = box_between({-10, -10, 10}, {-2, -2, 18});
   const Volume volume = scanned({bone, {tissue, muscle}, {marker, outside}}, {{"noise_hu", 0.0}, {"margin_mm", 16.0}});
-  EXPECT_NEAR(at(volume, {4, 4, 34}), 120, 2);  // where it lies in the CT, not in the images
-  EXPECT_NEAR(at(volume, {4, 4, 4}), 1450, 1);
-  EXPECT_NEAR(at(volume, {-6, -6, 14}), 1450, 1);  // the CT does not show what is not in the patient
-  EXPECT_NEAR(at(volume, {17.5, 0, 30}), 50, 2);
-  EXPECT_NEAR(at(volume, {25, 0, 30}), -100, 2);
-  EXPECT_NEAR(at(volume, {27, 27, 30}), -1000, 2);
+  EXPECT_NEAR(value_at(volume, {4, 4, 34}), 120, 2);  // where it lies in the CT, not in the images
+  EXPECT_NEAR(value_at(volume, {4, 4, 4}), 1450, 1);
+  EXPECT_NEAR(value_at(volume, {-6, -6, 14}), 1450, 1);  // the CT does not show what is not in the patient
+  EXPECT_NEAR(value_at(volume, {17.5, 0, 30}), 50, 2);
+  EXPECT_NEAR(value_at(volume, {25, 0, 30}), -100, 2);
+  EXPECT_NEAR(value_at(volume, {27, 27, 30}), -1000, 2);
 }
 
 TEST(SimulateClutter, SlicesAverageOverTheirThickness) {
   // A face at z = 0 between bone and air. Over a slice of 2 mm without blur, the value 0.4 mm outside is
   // (1 - 0.4) / 2 = 30 % bone, to the raster of 0.29 mm.
-  Phantom bone = test::whole(test::box({-10, -10, 0}, {10, 10, 40}));
-  const Volume volume = scanned({bone, {}, {}}, {{"noise_hu", 0.0},
-                                                 {"blur_mm", 0.0},
-                                                 {"margin_mm", 10.4},
-                                                 {"spacing_mm", std::vector<double>{1, 1, 2}},
-                                                 {"slice_thickness_mm", 2.0}});
-  const Eigen::Vector3d index = volume.grid.index_from_point({0, 0, -0.4});
-  ASSERT_NEAR(index.z(), 5, 1e-9);
-  const double share = (volume.at(20, 20, 5) + 1000) / 2450;
-  EXPECT_NEAR(share, 0.3, 0.08);
+  const Volume volume =
+      scanned({whole(box_between({-10, -10, 0}, {10, 10, 40})), {}, {}}, {{"noise_hu", 0.0},
+                                                                          {"blur_mm", 0.0},
+                                                                          {"margin_mm", 10.4},
+                                                                          {"spacing_mm", Numbers{1, 1, 2}},
+                                                                          {"slice_thickness_mm", 2.0}});
+  ASSERT_NEAR(volume.grid.index_from_point({0, 0, -0.4}).z(), 5, 1e-9);
+  EXPECT_NEAR((volume.at(20, 20, 5) + 1000) / 2450, 0.3, 0.08);
   EXPECT_EQ(volume.at(20, 20, 3), -1000);
   EXPECT_EQ(volume.at(20, 20, 7), 1450);
 }
 
 TEST(SimulateClutter, MetalMakesStreaksBetweenItsPartsOnly) {
-  Phantom bone = test::whole(test::box({-2, -2, -20}, {2, 2, 20}));
-  bone.bone.thigh_radius_mm = 80;
-  bone.bone.fat_mm = 12;
-  std::vector<Body> rods;
+  ClutteredPhantom rods{whole(box_between({-2, -2, -20}, {2, 2, 20}), {}, 80, 12), {}, {}};
   for (const double x : {-20.0, 20.0}) {
-    rods.push_back(body("steel", phantom::tube({x, 0, -8}, {x, 0, 8}, 3)));
-    rods.back().in_ct = true;
+    rods.bodies.push_back(body("steel", phantom::tube({x, 0, -8}, {x, 0, 8}, 3)));
+    rods.bodies.back().in_ct = true;
   }
-  const shipped::Options clean{{"noise_hu", 0.0}, {"margin_mm", 30.0}, {"metal_streaks", 0.0}};
-  shipped::Options streaked = clean;
-  streaked["metal_streaks"] = 1.0;
-  const Volume without = scanned({bone, {}, rods}, clean, 3), with = scanned({bone, {}, rods}, streaked, 3);
-  EXPECT_EQ(at(without, {20, 0, 0}), 3071);
-  EXPECT_EQ(at(with, {20, 0, 0}), 3071);
-  EXPECT_NEAR(at(without, {10, 0, 0}), 50, 1);
-  EXPECT_LT(at(with, {10, 0, 0}), -50);        // dark between the rods
-  EXPECT_NEAR(at(with, {0, 25, 0}), 50, 150);  // little beside them
-  EXPECT_EQ(at(with, {10, 0, 18}), at(without, {10, 0, 18})) << "slices without metal stay as they are";
-  EXPECT_EQ(with.values, scanned({bone, {}, rods}, streaked, 3).values);
+  const auto scan = [&](double streaks) {
+    return scanned(rods, {{"noise_hu", 0.0}, {"margin_mm", 30.0}, {"metal_streaks", streaks}}, 3);
+  };
+  const Volume without = scan(0), streaked = scan(1);
+  EXPECT_EQ(value_at(without, {20, 0, 0}), 3071);
+  EXPECT_EQ(value_at(streaked, {20, 0, 0}), 3071);
+  EXPECT_NEAR(value_at(without, {10, 0, 0}), 50, 1);
+  EXPECT_LT(value_at(streaked, {10, 0, 0}), -50);        // dark between the rods
+  EXPECT_NEAR(value_at(streaked, {0, 25, 0}), 50, 150);  // little beside them
+  EXPECT_EQ(value_at(streaked, {10, 0, 18}), value_at(without, {10, 0, 18})) << "slices without metal stay as they are";
+  EXPECT_EQ(streaked.values, scan(1).values);
 }
 
 TEST(SimulateClutter, BadInputIsExplained) {
   Phantom thin = broken();
   thin.bone.thigh_radius_mm = 0;
-  EXPECT_EQ(shipped::refusal("simulate.clutter", {{"phantom", shipped::item(thin)}}, {{"fat", std::string("mild")}}),
+  EXPECT_EQ(refusal("simulate.clutter", {{"phantom", item(thin)}}, {{"fat", std::string("mild")}}),
             "simulate.clutter: fat, folds and vessels need soft tissue, but the bone has none; set thigh_radius_mm of "
             "the bone, or these three to 'off'");
-  EXPECT_EQ(
-      marrow::test::message_of([] {
-        exposed({nothing(), {}, {body("cheese", test::box({0, 0, 0}, {1, 1, 1}))}});
-      }),
-      "simulate.fluoroscopy, 'thing': there is no material 'cheese'; there are: fat, muscle, blood, cortical bone, "
-      "cancellous bone, calcified wall, titanium, steel, copper, plastic, carbon");
-  EXPECT_EQ(marrow::test::message_of([] {
-              exposed({nothing(), {}, {body("steel", test::box({-1, -610, -1}, {1, 0, 1}))}});
-            }),
+  const auto refused = [](const Body& thing) {
+    return refusal("simulate.cluttered_fluoroscopy", in_beam({nothing(), {}, {thing}}));
+  };
+  const Mesh cube = box_between({0, 0, 0}, {1, 1, 1});
+  EXPECT_EQ(refused(body("cheese", cube)),
+            "simulate.fluoroscopy, 'thing': there is no material 'cheese'; there are: fat, muscle, blood, cortical "
+            "bone, cancellous bone, calcified wall, titanium, steel, copper, plastic, carbon");
+  EXPECT_EQ(refused(body("steel", box_between({-1, -610, -1}, {1, 0, 1}))),
             "simulate.fluoroscopy: 'thing' reaches to -10.000000 mm from the X-ray source; it must lie in front of the "
             "source, so check the camera's distances and where it is placed");
-  Mesh open = test::box({0, 0, 0}, {1, 1, 1});
-  open.triangles.pop_back();
-  EXPECT_EQ(
-      marrow::test::message_of([&] {
-        exposed({nothing(), {body("fat", open)}, {}});
-      }),
-      "simulate.fluoroscopy, 'thing': the surface is open or not consistently oriented, so it has no inside; close "
-      "its holes (each edge must be shared by exactly two triangles)");
+  EXPECT_EQ(refused(body("fat", opened(cube))),
+            "simulate.fluoroscopy, 'thing': the surface is open or not consistently oriented, so it has no inside; "
+            "close its holes (each edge must be shared by exactly two triangles)");
 }
 
 TEST(SimulateClutter, APlateWithoutRoomIsLeftOutWithAWarning) {
-  std::vector<std::string> warnings;
-  Context::Hooks hooks;
-  hooks.log = [&](std::string_view line, LogLevel) { warnings.emplace_back(line); };
-  const Phantom low = simulated::fracture(simulated::femur({{"resolution_mm", 2.0}}),
-                                          {{"height_fraction", 0.12}, {"obliquity_deg", 0.0}});
-  const auto phantom = shipped::call("simulate.clutter", {{"phantom", shipped::item(low)}},
-                                     {{"plate", std::string("bad")}}, Context(hooks))
-                           .at("phantom")
-                           .as<ClutteredPhantom>();
-  EXPECT_TRUE(phantom.bodies.empty());
-  EXPECT_EQ(warnings,
-            std::vector<std::string>{"the fracture is too near to the knee for a plate below it; it is left out"});
+  Heard heard;
+  const Phantom low = fracture(femur({{"resolution_mm", 2.0}}), {{"height_fraction", 0.12}, {"obliquity_deg", 0.0}});
+  const auto made = output<ClutteredPhantom>("simulate.clutter", "phantom", {{"phantom", item(low)}},
+                                             {{"plate", std::string("bad")}}, heard.context);
+  EXPECT_TRUE(made.bodies.empty());
+  EXPECT_EQ(heard.lines, Strings{"the fracture is too near to the knee for a plate below it; it is left out"});
 }
 
-}  // namespace clutter_test
+}  // namespace marrow::test::clutter_test

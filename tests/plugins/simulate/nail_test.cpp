@@ -1,22 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <gtest/gtest.h>
-
-#include <Eigen/Geometry>
-#include <cmath>
-
 #include "marrow/toolbox/geometry/implant.hpp"
-#include "tests/plugins/simulate/nodes.hpp"
+#include "tests/plugins/simulate/phantoms.hpp"
 
-namespace nail_test {
+namespace marrow::test::nail_test {
 
-using Eigen::Vector3d;
-using marrow::geometry::Implant;
-using marrow::phantom::ClutteredPhantom;
+using geometry::Implant;
+using namespace simulated;
 
-Implant nail(const shipped::Options& options = {}) {
-  shipped::Options coarse{{"length_mm", 250.0}, {"resolution_mm", 1.0}};
-  for (const auto& [name, value] : options) coarse[name] = value;
-  return shipped::call("simulate.nail", {}, coarse).at("implant").as<Implant>();
+Implant nail(const Options& options = {}) {
+  return output<Implant>("simulate.nail", "implant", {}, with({{"length_mm", 250.0}, {"resolution_mm", 1.0}}, options));
 }
 
 TEST(SimulateNail, IsACurvedTubeWithHolesAcross) {
@@ -32,8 +24,8 @@ TEST(SimulateNail, IsACurvedTubeWithHolesAcross) {
   EXPECT_TRUE(implant.holes[0].axis.isApprox(Vector3d::UnitX(), 1e-12));
   EXPECT_NEAR(implant.holes[1].axis.x(), 0, 1e-12) << "the second is turned by 90 degrees";
   // The tube, less three holes through two walls of 2.6 mm. A hole is somewhat longer than the wall is thick.
-  const double tube = marrow::kPi * (25 - 2.4 * 2.4) * 250, holes = 3 * 2 * marrow::kPi * 6.25 * 2.6;
-  EXPECT_NEAR(marrow::enclosed_volume_mm3(implant.surface), tube - 1.1 * holes, 0.01 * tube);
+  const double tube = kPi * (25 - 2.4 * 2.4) * 250, holes = 3 * 2 * kPi * 6.25 * 2.6;
+  EXPECT_NEAR(enclosed_volume_mm3(implant.surface), tube - 1.1 * holes, 0.01 * tube);
   EXPECT_EQ(implant.surface.frame, "implant");
 }
 
@@ -41,37 +33,31 @@ TEST(SimulateNail, RefusesWhatIsNoNail) {
   EXPECT_EQ(shipped::refusal("simulate.nail", {}, {{"bore_mm", 9.5}}),
             "simulate.nail: a bore of 9.500000 mm leaves a wall of less than 0.5 mm in a nail of 10.000000 mm; make "
             "the bore narrower");
-  EXPECT_EQ(shipped::refusal("simulate.nail", {},
-                             {{"hole_at_mm", std::vector<double>{310}}, {"hole_turn_deg", std::vector<double>{0}}}),
+  EXPECT_EQ(shipped::refusal("simulate.nail", {}, {{"hole_at_mm", Numbers{310}}, {"hole_turn_deg", Numbers{0}}}),
             "simulate.nail: the hole at 310.000000 mm from the tip does not lie within the nail, which is 300.000000 "
             "mm long");
-  EXPECT_EQ(
-      shipped::refusal(
-          "simulate.nail", {},
-          {{"hole_at_mm", std::vector<double>{}}, {"hole_turn_deg", std::vector<double>{}}, {"resolution_mm", 2.0}}),
-      "simulate.nail: the implant has no holes, so there is nothing to lock; give each hole's centre and axis");
+  EXPECT_EQ(shipped::refusal("simulate.nail", {},
+                             {{"hole_at_mm", Numbers{}}, {"hole_turn_deg", Numbers{}}, {"resolution_mm", 2.0}}),
+            "simulate.nail: the implant has no holes, so there is nothing to lock; give each hole's centre and axis");
 }
 
-const std::vector<double> kNone{0, 0, 0};
+const Numbers kNone{0, 0, 0};
 
-const ClutteredPhantom& femur() {
+const ClutteredPhantom& broken() {
   static const ClutteredPhantom phantom{
-      simulated::fracture(
-          simulated::femur({{"resolution_mm", 2.0}}),
-          {{"height_fraction", 0.4}, {"rotation_deg", kNone}, {"translation_mm", kNone}, {"ct_gap_mm", kNone}}),
+      fracture(femur({{"resolution_mm", 2.0}}),
+               {{"height_fraction", 0.4}, {"rotation_deg", kNone}, {"translation_mm", kNone}, {"ct_gap_mm", kNone}}),
       {},
       {}};
   return phantom;
 }
 
-shipped::Inputs inputs(const Implant& implant) {
-  return {{"phantom", shipped::item(femur())}, {"implant", shipped::item(implant)}};
-}
+Inputs inputs(const Implant& implant) { return {{"phantom", item(broken())}, {"implant", item(implant)}}; }
 
 TEST(SimulateNailing, ThePoseBringsTheImplantIntoTheCanal) {
   const Implant implant = nail();
-  const auto outputs = shipped::call("simulate.nailing", inputs(implant));
-  const auto& pose = outputs.at("truth").as<marrow::Truth>().world_from_model;
+  const auto outputs = call("simulate.nailing", inputs(implant));
+  const auto& pose = outputs.at("truth").as<Truth>().world_from_model;
   const auto& bodies = outputs.at("phantom").as<ClutteredPhantom>().bodies;
   ASSERT_EQ(bodies.size(), 2u);
   EXPECT_EQ(bodies[0].name, "reamed canal");
@@ -82,13 +68,13 @@ TEST(SimulateNailing, ThePoseBringsTheImplantIntoTheCanal) {
     EXPECT_TRUE(bodies[1].surface.vertices_mm[i].isApprox(pose * implant.surface.vertices_mm[i], 1e-12));
   // The tip stands 35 mm above the distal end, which lies 70 mm below the origin.
   EXPECT_NEAR(pose.translation_mm.z(), -35, 0.5);
-  EXPECT_LT(marrow::degrees(std::acos(pose.rotation(2, 2))), 15) << "along the femur";
-  const auto other = shipped::call("simulate.nailing", inputs(implant), {{"nail_seed", 2}});
-  EXPECT_FALSE(other.at("truth").as<marrow::Truth>().world_from_model.rotation.isApprox(pose.rotation, 1e-6));
+  EXPECT_LT(degrees(std::acos(pose.rotation(2, 2))), 15) << "along the femur";
+  const auto other = call("simulate.nailing", inputs(implant), {{"nail_seed", 2}});
+  EXPECT_FALSE(other.at("truth").as<Truth>().world_from_model.rotation.isApprox(pose.rotation, 1e-6));
 }
 
 TEST(SimulateNailing, RefusesANailThatDoesNotFit) {
-  const auto refusal = [](const Implant& implant, const shipped::Options& options = {}) {
+  const auto refusal = [](const Implant& implant, const Options& options = {}) {
     return shipped::refusal("simulate.nailing", inputs(implant), options);
   };
   const std::string thick = refusal(nail({{"diameter_mm", 20.0}}), {{"reaming_mm", 5.0}});
@@ -103,11 +89,10 @@ TEST(SimulateNailing, RefusesANailThatDoesNotFit) {
   EXPECT_NE(unreamed.find("take a thinner nail, or ream the canal with reaming_mm"), std::string::npos) << unreamed;
   const std::string long_one = refusal(nail({{"length_mm", 470.0}}));
   EXPECT_NE(long_one.find("where there is no canal; take a shorter nail"), std::string::npos) << long_one;
-  ClutteredPhantom solid = femur();
+  ClutteredPhantom solid = broken();
   solid.phantom.bone.inner = {};
-  EXPECT_EQ(
-      shipped::refusal("simulate.nailing", {{"phantom", shipped::item(solid)}, {"implant", shipped::item(nail())}}),
-      "simulate.nailing: the bone is solid, so it has no canal; give it an inner surface");
+  EXPECT_EQ(shipped::refusal("simulate.nailing", {{"phantom", item(solid)}, {"implant", item(nail())}}),
+            "simulate.nailing: the bone is solid, so it has no canal; give it an inner surface");
 }
 
-}  // namespace nail_test
+}  // namespace marrow::test::nail_test

@@ -1,14 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // Photographs of bodies whose colours and borders can be computed by hand.
-#include <gtest/gtest.h>
-
 #include "marrow/simulate/photograph.hpp"
-#include "nodes.hpp"
-#include "tests/harness/message_of.hpp"
+#include "tests/plugins/simulate/phantoms.hpp"
 
-namespace photograph_test {
+namespace marrow::test::photograph_test {
 
-using namespace marrow;
 using phantom::CameraArm;
 using phantom::Painted;
 using phantom::Sensor;
@@ -18,7 +14,7 @@ CameraArm arm(double k1 = 0) {
   CameraArm made;
   made.device.width_px = 320;
   made.device.height_px = 240;
-  made.device.intrinsics << 400, 0, 159.5, 0, 400, 119.5, 0, 0, 1;
+  made.device.intrinsics = pinhole(400, 320, 240).intrinsics;
   made.device.distortion.k = {k1, 0, 0};
   made.names = {"frontal", "lateral"};
   made.angles_deg = {0, 90};
@@ -33,7 +29,7 @@ const RigidTransform kWorld{"world", "body"};
 /// Only even light, so the light from a body is its albedo.
 Studio even() { return {{}, 1, {0, 0, 0}}; }
 
-Painted block(const Eigen::Vector3d& low, const Eigen::Vector3d& high, const Eigen::Vector3d& albedo) {
+Painted block(const Vector3d& low, const Vector3d& high, const Vector3d& albedo) {
   return {phantom::box(kWorld, low, high), albedo, 0, false};
 }
 
@@ -108,7 +104,7 @@ TEST(Photograph, TheSensorHasGammaAndNoise) {
 }
 
 TEST(Photograph, ABodyBehindTheCameraIsRefused) {
-  EXPECT_EQ(marrow::test::message_of([&] {
+  EXPECT_EQ(message_of([&] {
               taken({block({-5, -700, -5}, {5, 5, 5}, {1, 1, 1})}, even());
             }),
             "a photographed body reaches behind the camera or closer than 10 mm to it");
@@ -116,23 +112,20 @@ TEST(Photograph, ABodyBehindTheCameraIsRefused) {
 
 TEST(SimulatePhotograph, ShowsBoneClampAndPlatform) {
   const auto broken = simulated::fracture(simulated::femur({}), {{"height_fraction", 0.4}});
-  const auto camera =
-      shipped::call("simulate.camera_arm", {},
-                    {{"width_px", std::int64_t(320)}, {"height_px", std::int64_t(240)}, {"focal_px", 400.0}});
-  const auto commands = shipped::call("simulate.sweeps", {}, {{"max_rotation_deg", 0.0}}).at("commands");
-  const auto motion = shipped::call("simulate.hexapod", {{"phantom", shipped::item(broken)}, {"commands", commands}});
-  const auto photographs = [&](const shipped::Options& options, std::uint64_t seed) {
-    return shipped::call("simulate.photograph",
-                         {{"arm", camera.at("arm")},
-                          {"phantom", shipped::item(broken)},
-                          {"fragment", shipped::item(motion.at("fragment").as_list<Truth>()[0])},
-                          {"platform", shipped::item(motion.at("platform").as_list<Truth>()[0])}},
-                         options, Context(seed))
-        .at("photographs")
-        .as_list<Picture>();
+  const auto camera = call("simulate.camera_arm", {},
+                           {{"width_px", std::int64_t(320)}, {"height_px", std::int64_t(240)}, {"focal_px", 400.0}});
+  const auto commands = call("simulate.sweeps", {}, {{"max_rotation_deg", 0.0}}).at("commands");
+  const auto motion = call("simulate.hexapod", {{"phantom", item(broken)}, {"commands", commands}});
+  const auto photographs = [&](const Options& options, std::uint64_t seed) {
+    return output_list<Picture>("simulate.photograph", "photographs",
+                                {{"arm", camera.at("arm")},
+                                 {"phantom", item(broken)},
+                                 {"fragment", item(motion.at("fragment").as_list<Truth>()[0])},
+                                 {"platform", item(motion.at("platform").as_list<Truth>()[0])}},
+                                options, Context(seed));
   };
   const List<Picture> seen = photographs({{"noise_levels", 0.0}}, 1);
-  ASSERT_EQ(seen.names(), (std::vector<std::string>{"frontal", "lateral"}));
+  ASSERT_EQ(seen.names(), (Strings{"frontal", "lateral"}));
   for (const Picture& picture : seen) {
     // Bone is yellowish, the clamp blue, the platform grey; the backdrop is darker than all in red.
     int yellow = 0, blue = 0, grey = 0;
@@ -150,4 +143,4 @@ TEST(SimulatePhotograph, ShowsBoneClampAndPlatform) {
   EXPECT_GT(cv::norm(same[0].pixels, other[0].pixels), 0);
 }
 
-}  // namespace photograph_test
+}  // namespace marrow::test::photograph_test

@@ -1,30 +1,22 @@
 // SPDX-License-Identifier: Apache-2.0
 // Rays through closed surfaces compared with chords that are known exactly, and the polygoniser that makes the
 // surfaces.
-#include <gtest/gtest.h>
-
-#include <Eigen/Geometry>
-
-#include "marrow/base/error.hpp"
-#include "marrow/domain/camera.hpp"
 #include "marrow/simulate/solid.hpp"
-#include "shapes.hpp"
+#include "tests/plugins/simulate/phantoms.hpp"
 
-namespace rays_test {
+namespace marrow::test::rays_test {
 
-using namespace marrow;
 using namespace marrow::phantom;
-namespace shape = marrow::phantom::test;
+using namespace simulated;
 
 /// Length of bone on the ray of each pixel: {cortical, inner}.
 std::vector<std::array<double, 2>> lengths(const Phantom& phantom, const Camera& camera) {
   const SolidRays rays(phantom, camera.width_px, camera.height_px, [&](const Fragment& fragment) {
-    return
-        [&camera, camera_from_bone = camera.camera_from_world * fragment.world_from_bone()](const Eigen::Vector3d& p) {
-          const Eigen::Vector3d x = camera_from_bone * p;
-          const Eigen::Vector3d pixel = camera.intrinsics * x / x.z();
-          return RayVertex{pixel.x(), pixel.y(), -1 / x.z()};
-        };
+    return [&camera, camera_from_bone = camera.camera_from_world * fragment.world_from_bone()](const Vector3d& p) {
+      const Vector3d x = camera_from_bone * p;
+      const Vector3d pixel = camera.intrinsics * x / x.z();
+      return RayVertex{pixel.x(), pixel.y(), -1 / x.z()};
+    };
   });
   std::vector<std::array<double, 2>> result(std::size_t(camera.width_px) * std::size_t(camera.height_px), {0, 0});
   const auto crossings = rays.bundle().crossings(0, camera.height_px);
@@ -32,7 +24,7 @@ std::vector<std::array<double, 2>> lengths(const Phantom& phantom, const Camera&
     EXPECT_EQ(ray.size() % 2, 0u);
     std::vector<Interval> intervals;
     rays.intervals(ray, intervals);
-    const Eigen::Vector3d along = camera.intrinsics.inverse() * Eigen::Vector3d(ray[0].column, ray[0].row, 1);
+    const Vector3d along = camera.intrinsics.inverse() * Vector3d(ray[0].column, ray[0].row, 1);
     for (const Interval& i : intervals)
       result[ray[0].row * std::size_t(camera.width_px) + ray[0].column][i.cortical ? 0 : 1] +=
           (1 / i.from - 1 / i.to) * along.norm();
@@ -41,8 +33,7 @@ std::vector<std::array<double, 2>> lengths(const Phantom& phantom, const Camera&
 }
 
 /// Chord of a ray through a turned box, computed from its slabs and not from triangles.
-double box_chord(const Eigen::Vector3d& source, const Eigen::Vector3d& direction, const Eigen::Vector3d& low,
-                 const Eigen::Vector3d& high) {
+double box_chord(const Vector3d& source, const Vector3d& direction, const Vector3d& low, const Vector3d& high) {
   double from = -1e300, to = 1e300;
   for (int k = 0; k < 3; ++k) {
     const double a = (low[k] - source[k]) / direction[k], b = (high[k] - source[k]) / direction[k];
@@ -53,12 +44,10 @@ double box_chord(const Eigen::Vector3d& source, const Eigen::Vector3d& direction
 }
 
 TEST(Rays, TurnedBoxHasItsChordsToAMillionth) {
-  const Eigen::Vector3d low(-20, -10, -30), high(15, 25, 40);
-  Phantom phantom = shape::whole(shape::box(low, high));
-  RigidTransform& placed = phantom.fragments[0].world_from_ct;
-  placed.rotation = rotation_from_vector({0.3, -0.5, 0.7});
-  placed.translation_mm = {4, -3, 2};
-  const Camera camera = shape::camera(20, 200);
+  const Vector3d low(-20, -10, -30), high(15, 25, 40);
+  Phantom phantom = simulated::whole(box_between(low, high));
+  phantom.fragments[0].world_from_ct = placed({4, -3, 2}, {0.3, -0.5, 0.7});
+  const Camera camera = simulated::camera(20, 200);
   const auto measured = lengths(phantom, camera);
   const RigidTransform bone_from_world = inverse(phantom.fragments[0].world_from_bone());
   int off = 0, inside = 0;
@@ -78,14 +67,13 @@ TEST(Rays, TurnedBoxHasItsChordsToAMillionth) {
 }
 
 TEST(Rays, SphereAndHollowCylinderHaveTheirChords) {
-  const Camera camera = shape::camera(0, 128);
-  const auto ball = lengths(shape::whole(shape::sphere({5, 3, -8}, 30, 0.7)), camera);
-  const auto tube = lengths(shape::whole(shape::cylinder(20, -300, 300), shape::cylinder(8, -290, 290)), camera);
+  const Camera camera = simulated::camera(0, 128);
+  const auto ball = lengths(simulated::whole(simulated::sphere({5, 3, -8}, 30, 0.7)), camera);
+  const auto tube = lengths(simulated::whole(upright_cylinder(20, -300, 300), upright_cylinder(8, -290, 290)), camera);
   for (int v = 4; v < 128; v += 9)
     for (int u = 3; u < 128; u += 7) {
-      const Eigen::Vector3d source = source_position_mm(camera),
-                            direction = ray_direction(camera, {double(u), double(v)});
-      const double miss = (Eigen::Vector3d(5, 3, -8) - source).cross(direction).norm();
+      const Vector3d source = source_position_mm(camera), direction = ray_direction(camera, {double(u), double(v)});
+      const double miss = (Vector3d(5, 3, -8) - source).cross(direction).norm();
       if (std::abs(miss - 30) > 1) {
         EXPECT_NEAR(ball[std::size_t(v) * 128 + std::size_t(u)][0], miss < 30 ? 2 * std::sqrt(900 - miss * miss) : 0.0,
                     0.08);
@@ -111,7 +99,7 @@ TEST(Rays, CylinderFormulaAgreesWithAChordByHand) {
 TEST(Rays, RaysThroughEdgesAndCornersMeetEachSurfaceTwice) {
   // A box whose corners, edges and diagonals lie exactly on rays.
   RayBundle rays(12, 12);
-  const Mesh box = shape::box({2, 3, 1}, {9, 8, 5});
+  const Mesh box = box_between({2, 3, 1}, {9, 8, 5});
   std::vector<RayVertex> vertices;
   for (const auto& p : box.vertices_mm) vertices.push_back({p.x(), p.y(), p.z()});
   rays.add(vertices, box.triangles);
@@ -129,10 +117,10 @@ TEST(Rays, RaysThroughEdgesAndCornersMeetEachSurfaceTwice) {
 }
 
 TEST(Polygonise, SphereIsClosedOutwardAndHasItsVolume) {
-  const Mesh ball = shape::sphere({1, 2, 3}, 20, 0.9);
+  const Mesh ball = simulated::sphere({1, 2, 3}, 20, 0.9);
   EXPECT_TRUE(is_closed(ball));
   EXPECT_NEAR(enclosed_volume_mm3(ball) / (4.0 / 3 * kPi * 8000), 1, 2e-3);
-  for (const auto& vertex : ball.vertices_mm) EXPECT_NEAR((vertex - Eigen::Vector3d(1, 2, 3)).norm(), 20, 0.02);
+  for (const auto& vertex : ball.vertices_mm) EXPECT_NEAR((vertex - Vector3d(1, 2, 3)).norm(), 20, 0.02);
 }
 
 TEST(Fill, MeanOverALineIsExact) {
@@ -148,4 +136,4 @@ TEST(Fill, MeanOverALineIsExact) {
   EXPECT_NEAR(fill.mean(4, 4 + 1e-6), 0.32, 1e-6);
 }
 
-}  // namespace rays_test
+}  // namespace marrow::test::rays_test

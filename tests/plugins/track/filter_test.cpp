@@ -1,46 +1,41 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <gtest/gtest.h>
-
 #include "sequences.hpp"
 
-namespace filter_test {
+namespace marrow::test::filter_test {
 
-using marrow::Pose;
-using marrow::Vector6d;
-using marrow::track::TrackState;
 using sequences::six;
-using shipped::item;
+using track::TrackState;
 
 const Vector6d kNoise = six(0.05, 0.05, 0.2, 0.05, 0.05, 0.1);
 
-Pose pose_at(const marrow::RigidTransform& world_from_model, const TrackState& state, double cost = 0.2) {
+Pose pose_at(const RigidTransform& world_from_model, const TrackState& state, double cost = 0.2) {
   Pose pose;
   pose.world_from_model = world_from_model;
   pose.frame = state.fragment;
-  pose.covariance = marrow::Matrix6d(kNoise.cwiseAbs2().asDiagonal());
+  pose.covariance = Matrix6d(kNoise.cwiseAbs2().asDiagonal());
   pose.cost = cost;
   return pose;
 }
 
-shipped::Outputs filtered(const TrackState& state, const Pose* pose, const marrow::Verdict* verdict = nullptr,
-                          const shipped::Options& options = {}) {
-  shipped::Inputs inputs{{"state", item(state)}};
+Outputs filtered(const TrackState& state, const Pose* pose, const Verdict* verdict = nullptr,
+                 const Options& options = {}) {
+  Inputs inputs{{"state", item(state)}};
   if (pose) inputs["pose"] = item(*pose);
   if (verdict) inputs["verdict"] = item(*verdict);
-  return shipped::call("track.filter", inputs, options);
+  return call("track.filter", inputs, options);
 }
 
-TrackState state_of(const shipped::Outputs& outputs) { return outputs.at("state").as<TrackState>(); }
+TrackState state_of(const Outputs& outputs) { return outputs.at("state").as<TrackState>(); }
 
 TEST(TrackFilter, FollowsABoneWithinItsDeviations) {
   TrackState state = sequences::begin({{"frame_rate_hz", 62.0}});
-  marrow::Random random(1, 1);
-  marrow::RigidTransform truth = state.now.world_from_model;
+  Random random(1, 1);
+  RigidTransform truth = state.now.world_from_model;
   Vector6d velocity = six(120, -60, 90, 100, -150, 50);
   double surprises = 0, squares = 0;
   constexpr int kFrames = 400;
   for (int i = 0; i < kFrames; ++i) {
-    state = marrow::track::predicted(state);
+    state = track::predicted(state);
     const auto measured = sequences::measured(truth, state, kNoise, random);
     const Pose pose = pose_at(measured.world_from_model, state);
     // Of 400 right poses, some lie beyond the gate by chance. They count here, too.
@@ -65,10 +60,10 @@ TEST(TrackFilter, FollowsABoneWithinItsDeviations) {
 }
 
 TEST(TrackFilter, SaysWhyABoneIsLost) {
-  TrackState state = marrow::track::predicted(sequences::begin());
+  TrackState state = track::predicted(sequences::begin());
   state.usual_cost = 0.2;
-  const marrow::RigidTransform there = state.predicted.world_from_model;
-  const auto note = [&](const Pose* pose, const marrow::Verdict* verdict = nullptr) {
+  const RigidTransform there = state.predicted.world_from_model;
+  const auto note = [&](const Pose* pose, const Verdict* verdict = nullptr) {
     return state_of(filtered(state, pose, verdict)).note;
   };
   Pose good = pose_at(there, state);
@@ -81,8 +76,8 @@ TEST(TrackFilter, SaysWhyABoneIsLost) {
   EXPECT_EQ(note(&dear), "its cost is 0.5, where 0.2 is usual");
   const Pose far = pose_at(moved(there, state.fragment, six(0, 0, 60, 0, 0, 0)), state);
   EXPECT_EQ(note(&far).substr(0, 54), "it is not where the motion leads: squared distance 165");
-  marrow::Verdict wrong;
-  wrong.judgement = marrow::Judgement::wrong;
+  Verdict wrong;
+  wrong.judgement = Judgement::wrong;
   wrong.reasons = {"the shaft is too wide"};
   EXPECT_EQ(note(&good, &wrong), "its verdict is wrong: the shaft is too wide");
 }
@@ -92,7 +87,7 @@ TEST(TrackFilter, TheUsualCostFollowsOneThatGrowsSlowly) {
   TrackState state = sequences::begin();
   double cost = 0.02;
   for (int i = 0; i < 20; ++i, cost *= 1.15) {
-    state = marrow::track::predicted(state);
+    state = track::predicted(state);
     const Pose pose = pose_at(state.predicted.world_from_model, state, cost);
     state = state_of(filtered(state, &pose));
     EXPECT_TRUE(state.is_found()) << i << ": " << state.note;
@@ -100,24 +95,24 @@ TEST(TrackFilter, TheUsualCostFollowsOneThatGrowsSlowly) {
 }
 
 TEST(TrackFilter, ALostBoneIsWhereItsMotionLeads) {
-  TrackState state = marrow::track::predicted(sequences::begin());
-  const shipped::Outputs outputs = filtered(state, nullptr);
+  TrackState state = track::predicted(sequences::begin());
+  const Outputs outputs = filtered(state, nullptr);
   const TrackState lost = state_of(outputs);
   EXPECT_FALSE(lost.is_found());
   EXPECT_EQ(lost.frames_lost, 1);
   EXPECT_EQ(lost.now.world_from_model.rotation, state.predicted.world_from_model.rotation);
-  EXPECT_EQ(outputs.at("pose").as<Pose>().warnings, (std::vector<std::string>{"no pose was found"}));
-  const TrackState again = state_of(filtered(marrow::track::predicted(lost), nullptr));
+  EXPECT_EQ(outputs.at("pose").as<Pose>().warnings, (Strings{"no pose was found"}));
+  const TrackState again = state_of(filtered(track::predicted(lost), nullptr));
   EXPECT_EQ(again.frames_lost, 2);
   EXPECT_GT(again.now.covariance(2, 2), lost.now.covariance(2, 2));
-  const TrackState next = marrow::track::predicted(again);
+  const TrackState next = track::predicted(again);
   const Pose found = pose_at(next.predicted.world_from_model, next);
   EXPECT_EQ(state_of(filtered(next, &found)).frames_lost, 0);
 }
 
 TEST(TrackFilter, APoseThatIsKnownExactlyIsNone) {
   // No registration knows a pose exactly: such a covariance comes from a cost that is the same everywhere.
-  const TrackState state = marrow::track::predicted(sequences::begin());
+  const TrackState state = track::predicted(sequences::begin());
   Pose exact = pose_at(state.predicted.world_from_model, state);
   exact.covariance->setZero();
   const TrackState after = state_of(filtered(state, &exact));
@@ -127,8 +122,8 @@ TEST(TrackFilter, APoseThatIsKnownExactlyIsNone) {
 }
 
 TEST(TrackFilter, APoseWithoutDeviationsThatCanBeWeighedIsNone) {
-  const TrackState state = marrow::track::predicted(sequences::begin());
-  const auto note = [&](const marrow::Matrix6d& covariance) {
+  const TrackState state = track::predicted(sequences::begin());
+  const auto note = [&](const Matrix6d& covariance) {
     Pose pose = pose_at(state.predicted.world_from_model, state);
     pose.covariance = covariance;
     const TrackState after = state_of(filtered(state, &pose));
@@ -136,10 +131,10 @@ TEST(TrackFilter, APoseWithoutDeviationsThatCanBeWeighedIsNone) {
     EXPECT_FALSE(after.usual_covariance);
     return after.note;
   };
-  marrow::Matrix6d right = kNoise.cwiseAbs2().asDiagonal(), flat = right, open = right;
+  Matrix6d right = kNoise.cwiseAbs2().asDiagonal(), flat = right, open = right;
   flat.row(5).setZero(), flat.col(5).setZero();
   EXPECT_EQ(note(flat), "its predicted deviation is 0 in one direction, which no image tells exactly");
-  EXPECT_EQ(note(1e-14 * marrow::Matrix6d::Identity()),
+  EXPECT_EQ(note(1e-14 * Matrix6d::Identity()),
             "its predicted deviation is 0 in one direction, which no image tells exactly");
   open(2, 2) = std::numeric_limits<double>::infinity();
   EXPECT_EQ(note(open), "the images do not determine the pose");
@@ -147,14 +142,13 @@ TEST(TrackFilter, APoseWithoutDeviationsThatCanBeWeighedIsNone) {
 
 TEST(TrackFilter, ACovarianceInOtherAxesIsTurned) {
   // The same knowledge about other axes: what is loose along x there is loose along y here.
-  const TrackState state = marrow::track::predicted(sequences::begin());
+  const TrackState state = track::predicted(sequences::begin());
   Pose pose = pose_at(state.predicted.world_from_model, state);
-  const Pose same =
-      marrow::in_frame(pose, {state.fragment.origin_mm + Eigen::Vector3d(40, -30, 20),
-                              state.fragment.axes * marrow::rotation_from_vector({0, 0, marrow::kPi / 2})});
-  const marrow::Matrix6d expected = state_of(filtered(state, &pose)).now.covariance.topLeftCorner<6, 6>(),
-                         found = state_of(filtered(state, &same)).now.covariance.topLeftCorner<6, 6>();
+  const Pose same = in_frame(pose, {state.fragment.origin_mm + Vector3d(40, -30, 20),
+                                    state.fragment.axes * rotation_from_vector({0, 0, kPi / 2})});
+  const Matrix6d expected = state_of(filtered(state, &pose)).now.covariance.topLeftCorner<6, 6>(),
+                 found = state_of(filtered(state, &same)).now.covariance.topLeftCorner<6, 6>();
   EXPECT_LT((found - expected).norm(), 1e-9 * expected.norm());
 }
 
-}  // namespace filter_test
+}  // namespace marrow::test::filter_test

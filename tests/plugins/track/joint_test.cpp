@@ -1,18 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <gtest/gtest.h>
-
 #include "sequences.hpp"
 
-namespace joint_test {
+namespace marrow::test::joint_test {
 
-using marrow::List;
-using marrow::RigidTransform;
-using marrow::track::TrackState;
-using shipped::figure;
+using track::TrackState;
 
-RigidTransform turned(const Eigen::Vector3d& rotation_deg, const Eigen::Vector3d& shift_mm = {0, 0, 0}) {
+RigidTransform turned(const Vector3d& rotation_deg, const Vector3d& shift_mm = {0, 0, 0}) {
   RigidTransform pose{"world", "ct"};
-  pose.rotation = marrow::rotation_from_vector(rotation_deg * marrow::radians(1));
+  pose.rotation = rotation_from_vector(rotation_deg * radians(1));
   pose.translation_mm = shift_mm;
   return pose;
 }
@@ -27,12 +22,12 @@ List<TrackState> states(const std::vector<RigidTransform>& poses) {
   return list;
 }
 
-std::vector<marrow::Value> motion(const std::vector<RigidTransform>& proximal,
-                                  const std::vector<RigidTransform>& distal, const shipped::Options& options = {}) {
-  return shipped::call("track.joint",
-                       {{"proximal", shipped::list(states(proximal), "frame")},
-                        {"distal", shipped::list(states(distal), "frame")}},
-                       options)
+std::vector<Value> motion(const std::vector<RigidTransform>& proximal, const std::vector<RigidTransform>& distal,
+                          const Options& options = {}) {
+  return call("track.joint",
+              {{"proximal", shipped::list(states(proximal), "frame")},
+               {"distal", shipped::list(states(distal), "frame")}},
+              options)
       .at("metrics")
       .items;
 }
@@ -54,16 +49,16 @@ TEST(Joint, EachAngleByItself) {
 }
 
 TEST(Joint, OnlyTheMotionBetweenTheBonesCounts) {
-  const RigidTransform both{"world", "world", marrow::rotation_from_vector({0.4, -0.9, 0.2}), {30, -10, 5}};
+  const RigidTransform both{"world", "world", rotation_from_vector({0.4, -0.9, 0.2}), {30, -10, 5}};
   const auto alone = motion({turned({0, 0, 0})}, {turned({20, 5, -8}, {1, 2, 3})});
   const auto moved = motion({both * turned({0, 0, 0})}, {both * turned({20, 5, -8}, {1, 2, 3})});
-  for (const marrow::Metric& metric : alone[0].as<marrow::Metrics>().items)
+  for (const Metric& metric : alone[0].as<Metrics>().items)
     EXPECT_NEAR(figure(moved[0], metric.name), metric.value, 1e-6) << metric.name;
 }
 
 TEST(Joint, ShiftsAreThoseOfTheCentre) {
   const auto found =
-      motion({turned({0, 0, 0})}, {turned({0, 0, 0}, {-2, -3, -4})}, {{"centre_mm", std::vector<double>{10, 20, 30}}});
+      motion({turned({0, 0, 0})}, {turned({0, 0, 0}, {-2, -3, -4})}, {{"centre_mm", Numbers{10, 20, 30}}});
   EXPECT_NEAR(figure(found[0], "right_mm"), 2, 1e-9);
   EXPECT_NEAR(figure(found[0], "front_mm"), 3, 1e-9);
   EXPECT_NEAR(figure(found[0], "distraction_mm"), 4, 1e-9);
@@ -79,15 +74,14 @@ TEST(Joint, TheHelicalAxisSinceTheFirstFrame) {
 }
 
 TEST(Joint, SaysWhatDoesNotFit) {
-  const auto refusal = [](const shipped::Options& options, std::size_t frames) {
+  const auto refusal = [](const Options& options, std::size_t frames) {
     return shipped::refusal("track.joint",
                             {{"proximal", shipped::list(states({turned({0, 0, 0})}), "frame")},
                              {"distal", shipped::list(states(std::vector(frames, turned({0, 0, 0}))), "frame")}},
                             options);
   };
   EXPECT_EQ(refusal({}, 2), "the two bones are not followed through the same frames: there are 1 and 2");
-  EXPECT_EQ(refusal({{"up", std::vector<double>{2, 0, 0}}}, 1),
-            "'right' and 'up' must be two different directions of the CT");
+  EXPECT_EQ(refusal({{"up", Numbers{2, 0, 0}}}, 1), "'right' and 'up' must be two different directions of the CT");
 }
 
-}  // namespace joint_test
+}  // namespace marrow::test::joint_test

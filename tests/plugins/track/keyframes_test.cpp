@@ -1,21 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <gtest/gtest.h>
-
 #include "marrow/toolbox/track/sequence.hpp"
 #include "sequences.hpp"
 #include "tests/plugins/read/files.hpp"
 
-namespace keyframes_test {
+namespace marrow::test::keyframes_test {
 
-using marrow::RigidTransform;
-using marrow::Vector6d;
-using marrow::test::put;
-using marrow::test::TemporaryFolder;
-using marrow::track::AutoscoperTrack;
-using marrow::track::SequenceFrame;
-using marrow::track::TrackState;
 using sequences::six;
-using shipped::item;
+using track::AutoscoperTrack;
+using track::SequenceFrame;
+using track::TrackState;
 
 const std::string kPlaced = "0,-1,0,1,1,0,0,-2.5,0,0,1,300,0,0,0,1\n";
 const std::string kNone = "NaN,NaN,NaN,NaN,NaN,NaN,NaN,NaN,NaN,NaN,NaN,NaN,NaN,NaN,NaN,NaN\n";
@@ -23,14 +16,14 @@ const std::string kNone = "NaN,NaN,NaN,NaN,NaN,NaN,NaN,NaN,NaN,NaN,NaN,NaN,NaN,N
 class TrackKeyframes : public testing::Test {
  protected:
   TrackKeyframes() {
-    for (const char* bone : {"femur", "left/tibia"}) bones.add(bone, marrow::Pose{});
+    for (const char* bone : {"femur", "left/tibia"}) bones.add(bone, Pose{});
     for (const char* frame : {"0001", "0002", "0003"}) frames.add(frame, SequenceFrame{});
   }
-  shipped::Inputs inputs() const {
+  Inputs inputs() const {
     return {{"poses", shipped::list(bones, "fragment")}, {"frames", shipped::list(frames, "frame")}};
   }
-  marrow::List<AutoscoperTrack> read(const std::string& path) const {
-    return shipped::call("track.keyframes", inputs(), {{"path", path}}).at("keyframes").as_list<AutoscoperTrack>();
+  List<AutoscoperTrack> read(const std::string& path) const {
+    return output_list<AutoscoperTrack>("track.keyframes", "keyframes", inputs(), {{"path", path}});
   }
   /// The message behind the folder's name.
   std::string refusal(const std::string& inside = "") const {
@@ -38,8 +31,8 @@ class TrackKeyframes : public testing::Test {
     const std::string where = (folder / "").string();
     return said.starts_with(where) ? said.substr(where.size()) : said;
   }
-  marrow::List<marrow::Pose> bones;
-  marrow::List<SequenceFrame> frames;
+  List<Pose> bones;
+  List<SequenceFrame> frames;
   TemporaryFolder folder;
 };
 
@@ -47,11 +40,11 @@ TEST_F(TrackKeyframes, AFileForEachBoneThatHasSome) {
   put(folder / "left%2Ftibia.tra", kNone + kPlaced + kNone);
   put(folder / "femur.yaml", "the start of a bone may lie beside it");
   const auto tracks = read(folder.path().string());
-  EXPECT_EQ(tracks.names(), (std::vector<std::string>{"femur", "left/tibia"}));
+  EXPECT_EQ(tracks.names(), (Strings{"femur", "left/tibia"}));
   EXPECT_TRUE(tracks[0].world_from_bone.empty());
   ASSERT_EQ(tracks[1].world_from_bone.size(), 3u);
   EXPECT_FALSE(tracks[1].world_from_bone[0]);
-  EXPECT_EQ(*tracks[1].world_from_bone[1] * Eigen::Vector3d(10, 0, 0), Eigen::Vector3d(1, 7.5, 300));
+  EXPECT_EQ(*tracks[1].world_from_bone[1] * Vector3d(10, 0, 0), Vector3d(1, 7.5, 300));
 }
 
 TEST_F(TrackKeyframes, NoFolderMeansNone) {
@@ -91,13 +84,13 @@ class TrackPredict : public testing::Test {
   TrackPredict() {
     state.now.velocity_per_s = six(30, 0, 0, 60, 0, 0);
     state.now.covariance(0, 6) = state.now.covariance(6, 0) = 1e-3;
-    keyframe.rotation = marrow::rotation_from_vector({0.1, -0.7, 0.3});
+    keyframe.rotation = rotation_from_vector({0.1, -0.7, 0.3});
     keyframe.translation_mm = {1, -200, 3};
   }
-  shipped::Outputs predicted(const AutoscoperTrack* keyframes, const shipped::Options& options = {}) const {
-    shipped::Inputs inputs{{"state", item(state)}};
+  Outputs predicted(const AutoscoperTrack* keyframes, const Options& options = {}) const {
+    Inputs inputs{{"state", item(state)}};
     if (keyframes) inputs["keyframes"] = item(*keyframes);
-    return shipped::call("track.predict", inputs, options);
+    return call("track.predict", inputs, options);
   }
   TrackState state = sequences::begin();
   RigidTransform keyframe{"world", "ct"};
@@ -109,15 +102,15 @@ TEST_F(TrackPredict, AKeyframeTakesThePlaceOfThePrediction) {
       &keyframes,
       {{"keyframe_deg", 2.0}, {"keyframe_mm", 4.0}, {"keyframe_speed_deg_s", 50.0}, {"keyframe_speed_mm_s", 70.0}});
   const TrackState next = out.at("state").as<TrackState>();
-  const marrow::Pose pose = out.at("pose").as<marrow::Pose>();
+  const Pose pose = out.at("pose").as<Pose>();
   EXPECT_EQ(pose.world_from_model.translation_mm, keyframe.translation_mm);
   EXPECT_EQ(pose.world_from_model.rotation, keyframe.rotation);
   EXPECT_EQ(pose.frame.origin_mm, state.fragment.origin_mm);
   EXPECT_EQ(next.predicted.world_from_model.rotation, keyframe.rotation);
   EXPECT_EQ(next.now.velocity_per_s, Vector6d(Vector6d::Zero())) << "the frames before were wrong";
-  marrow::track::Vector12d deviation;
+  track::Vector12d deviation;
   deviation << six(2, 2, 2, 4, 4, 4), six(50, 50, 50, 70, 70, 70);
-  EXPECT_LT((next.now.covariance - marrow::track::Matrix12d(deviation.cwiseAbs2().asDiagonal())).norm(), 1e-9);
+  EXPECT_LT((next.now.covariance - track::Matrix12d(deviation.cwiseAbs2().asDiagonal())).norm(), 1e-9);
   EXPECT_EQ(next.frame, 0);
   EXPECT_FALSE(next.is_found());
 }
@@ -125,8 +118,8 @@ TEST_F(TrackPredict, AKeyframeTakesThePlaceOfThePrediction) {
 TEST_F(TrackPredict, OnlyTheVelocityIsKeptAndOnlyIfItLedToTheKeyframe) {
   state.usual_cost = 0.3;
   state.noise_scale = 5;
-  state.usual_covariance = marrow::Matrix6d(marrow::Matrix6d::Identity());
-  const RigidTransform expected = predicted(nullptr).at("pose").as<marrow::Pose>().world_from_model;
+  state.usual_covariance = Matrix6d(Matrix6d::Identity());
+  const RigidTransform expected = predicted(nullptr).at("pose").as<Pose>().world_from_model;
   const auto state_at = [&](const Vector6d& from_prediction) {
     const AutoscoperTrack keyframes{{moved(expected, state.fragment, from_prediction)}};
     return predicted(&keyframes).at("state").as<TrackState>();
@@ -164,7 +157,7 @@ TEST_F(TrackPredict, RefusesAFrameBehindTheLastLine) {
 // A bone that jumps, as after a gap in the recording: without a keyframe it stays lost, with one it is found at once.
 TEST_F(TrackPredict, AKeyframeFindsALostBoneAgain) {
   const Vector6d noise = six(0.05, 0.05, 0.2, 0.05, 0.05, 0.1);
-  marrow::Random random(1, 1);
+  Random random(1, 1);
   const auto found_at_jump = [&](bool has_keyframe) {
     TrackState now = sequences::begin();
     RigidTransform truth = now.now.world_from_model;
@@ -173,16 +166,14 @@ TEST_F(TrackPredict, AKeyframeFindsALostBoneAgain) {
       if (frame == 6) truth = moved(truth, now.fragment, six(60, 0, 0, 80, 0, 0));
       if (frame == 6 && has_keyframe)
         keyframes.world_from_bone[6] = moved(truth, now.fragment, six(2, -2, 1, 2, 1, -2));
-      now = shipped::call("track.predict", {{"state", item(now)}, {"keyframes", item(keyframes)}})
-                .at("state")
-                .as<TrackState>();
+      now = output<TrackState>("track.predict", "state", {{"state", item(now)}, {"keyframes", item(keyframes)}});
       const auto measured = sequences::measured(truth, now, noise, random);
-      marrow::Pose pose;
+      Pose pose;
       pose.world_from_model = measured.world_from_model;
       pose.frame = now.fragment;
       pose.covariance = measured.covariance;
       pose.cost = 0.2;
-      now = shipped::call("track.filter", {{"state", item(now)}, {"pose", item(pose)}}).at("state").as<TrackState>();
+      now = output<TrackState>("track.filter", "state", {{"state", item(now)}, {"pose", item(pose)}});
       if (frame == 6) break;
     }
     return now.is_found();
@@ -191,4 +182,4 @@ TEST_F(TrackPredict, AKeyframeFindsALostBoneAgain) {
   EXPECT_TRUE(found_at_jump(true));
 }
 
-}  // namespace keyframes_test
+}  // namespace marrow::test::keyframes_test

@@ -1,31 +1,27 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <gtest/gtest.h>
-
 #include <Eigen/Cholesky>
 
 #include "sequences.hpp"
-#include "tests/harness/message_of.hpp"
 
-namespace smooth_test {
+namespace marrow::test::smooth_test {
 
-using marrow::Vector6d;
-using marrow::track::TrackState;
 using sequences::six;
+using track::TrackState;
 
-std::vector<TrackState> filtered(TrackState state, const std::vector<marrow::RigidTransform>& way,
-                                 const Vector6d& noise, std::uint64_t seed) {
-  marrow::Random random(seed, 1);
+std::vector<TrackState> filtered(TrackState state, const std::vector<RigidTransform>& way, const Vector6d& noise,
+                                 std::uint64_t seed) {
+  Random random(seed, 1);
   std::vector<TrackState> states;
-  for (const marrow::RigidTransform& truth : way) {
-    state = marrow::track::predicted(state);
-    state = marrow::track::updated(state, sequences::measured(truth, state, noise, random));
+  for (const RigidTransform& truth : way) {
+    state = track::predicted(state);
+    state = track::updated(state, sequences::measured(truth, state, noise, random));
     states.push_back(state);
   }
   return states;
 }
 
 /// Root mean square of the error about the long axis.
-double axial_rms(const std::vector<TrackState>& states, const std::vector<marrow::RigidTransform>& way) {
+double axial_rms(const std::vector<TrackState>& states, const std::vector<RigidTransform>& way) {
   double sum = 0;
   for (std::size_t i = 0; i < way.size(); ++i)
     sum += std::pow(motion_between(way[i], states[i].now.world_from_model, states[i].fragment)[2], 2);
@@ -38,7 +34,7 @@ TEST(Smooth, LowersTheErrorOfASteadyMotion) {
   const auto way = sequences::way(begin, six(120, -60, 30, 100, -150, 50), 100);
   for (const std::uint64_t seed : {1, 2, 3}) {
     const auto states = filtered(begin, way, noise, seed);
-    EXPECT_LT(axial_rms(marrow::track::smoothed(states), way), 0.5 * axial_rms(states, way)) << seed;
+    EXPECT_LT(axial_rms(track::smoothed(states), way), 0.5 * axial_rms(states, way)) << seed;
   }
 }
 
@@ -47,19 +43,19 @@ TEST(Smooth, DoesNotRelyOnTheCovariancesOfTheRegistration) {
   const Vector6d noise = six(0.05, 0.05, 0.3, 0.05, 0.05, 0.1);
   for (const double wrong : {0.1, 1.0, 10.0}) {
     TrackState state = sequences::begin({{"frame_rate_hz", 62.0}});
-    marrow::Random random(5, 1);
+    Random random(5, 1);
     std::vector<TrackState> states;
-    std::vector<marrow::RigidTransform> way;
+    std::vector<RigidTransform> way;
     for (int i = 0; i < 100; ++i) {
-      const double phase = 2 * marrow::kPi * i / 62 / 0.8;
+      const double phase = 2 * kPi * i / 62 / 0.8;
       way.push_back(moved(sequences::begin().now.world_from_model, state.fragment,
                           (1 - std::cos(phase)) * six(2, 1, 5, 1, 2, 3)));
-      marrow::track::Measurement measured = sequences::measured(way.back(), state, noise, random);
+      track::Measurement measured = sequences::measured(way.back(), state, noise, random);
       measured.covariance *= wrong;
-      state = marrow::track::updated(marrow::track::predicted(state), measured);
+      state = track::updated(track::predicted(state), measured);
       states.push_back(state);
     }
-    EXPECT_LT(axial_rms(marrow::track::smoothed(states), way), 0.6 * marrow::radians(0.3)) << wrong;
+    EXPECT_LT(axial_rms(track::smoothed(states), way), 0.6 * radians(0.3)) << wrong;
   }
 }
 
@@ -70,11 +66,9 @@ TEST(Smooth, IsTheLeastSquaresSolution) {
   TrackState begin = sequences::begin({{"frame_rate_hz", rate}, {"acceleration_mm_s2", 40.0}});
   const auto way = sequences::way(begin, six(0, 0, 0, 0, 0, 20), kFrames);
   const auto states = filtered(begin, way, six(1e-7, 1e-7, 1e-7, noise, noise, noise), 4);
-  const auto smoothed = marrow::track::smoothed(states);
+  const auto smoothed = track::smoothed(states);
   const double acceleration = smoothed[0].acceleration_per_s2[5];
-  const auto along = [&](const marrow::RigidTransform& pose) {
-    return motion_between(way[0], pose, begin.fragment)[5];
-  };
+  const auto along = [&](const RigidTransform& pose) { return motion_between(way[0], pose, begin.fragment)[5]; };
   Eigen::MatrixXd normal = Eigen::MatrixXd::Zero(2 * kFrames, 2 * kFrames);
   Eigen::VectorXd right = Eigen::VectorXd::Zero(2 * kFrames);
   const auto add = [&](const Eigen::RowVectorXd& row, double value, double deviation) {
@@ -87,7 +81,7 @@ TEST(Smooth, IsTheLeastSquaresSolution) {
                                     .finished()
                                     .inverse();
   normal.topLeftCorner<2, 2>() += prior;
-  right.head<2>() += prior * Eigen::Vector2d(along(states[0].now.world_from_model), states[0].now.velocity_per_s[5]);
+  right.head<2>() += prior * Vector2d(along(states[0].now.world_from_model), states[0].now.velocity_per_s[5]);
   for (int i = 0; i < kFrames; ++i) {
     Eigen::RowVectorXd row = Eigen::RowVectorXd::Zero(2 * kFrames);
     if (i > 0) {
@@ -115,8 +109,8 @@ TEST(Smooth, FramesMustFollowEachOther) {
   const TrackState begin = sequences::begin();
   auto states = filtered(begin, sequences::way(begin, Vector6d::Zero(), 3), six(1, 1, 1, 1, 1, 1), 1);
   states.erase(states.begin() + 1);
-  EXPECT_EQ(marrow::test::message_of([&] { marrow::track::smoothed(states); }),
+  EXPECT_EQ(message_of([&] { track::smoothed(states); }),
             "the frames to smooth do not follow each other: frame 2 stands where frame 1 is expected");
 }
 
-}  // namespace smooth_test
+}  // namespace marrow::test::smooth_test

@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <gtest/gtest.h>
-
 #include <fstream>
 #include <sstream>
 
@@ -9,18 +7,17 @@
 #include "tests/plugins/track/sequences.hpp"
 #include "tests/plugins/write/writing.hpp"
 
-namespace trajectory_test {
+namespace marrow::test::trajectory_test {
 
-using marrow::List;
-using marrow::track::TrackState;
-using marrow::track::Trajectory;
+using track::TrackState;
+using track::Trajectory;
 
 /// The cells of each line, without quotes: no cell of these has a comma.
-std::vector<std::vector<std::string>> table_of(const Trajectory& trajectory) {
-  const marrow::test::TemporaryFolder folder;
+std::vector<Strings> table_of(const Trajectory& trajectory) {
+  const TemporaryFolder folder;
   writing::write(trajectory, folder / "way.csv");
-  std::istringstream lines(marrow::test::bytes_of(folder / "way.csv"));
-  std::vector<std::vector<std::string>> table;
+  std::istringstream lines(bytes_of(folder / "way.csv"));
+  std::vector<Strings> table;
   for (std::string line; std::getline(lines, line);) {
     std::erase(line, '"');
     std::istringstream row(line + ",");
@@ -30,11 +27,11 @@ std::vector<std::vector<std::string>> table_of(const Trajectory& trajectory) {
   return table;
 }
 
-List<marrow::Verdict> verdicts_of_frames(int count) {
-  List<marrow::Verdict> verdicts;
+List<Verdict> verdicts_of_frames(int count) {
+  List<Verdict> verdicts;
   for (int i = 0; i < count; ++i) {
-    marrow::Verdict verdict;
-    verdict.judgement = i == 1 ? marrow::Judgement::doubtful : marrow::Judgement::trusted;
+    Verdict verdict;
+    verdict.judgement = i == 1 ? Judgement::doubtful : Judgement::trusted;
     verdict.failure_probability = i == 1 ? 0.25 : 0;
     verdicts.add("000" + std::to_string(i + 1), verdict);
   }
@@ -56,10 +53,9 @@ Trajectory three_frames(int verdicts = 3) {
     if (i == 1) state.note = "no edges";
     states.add("000" + std::to_string(i + 1), state);
   }
-  return shipped::call("track.trajectory", {{"states", shipped::list(states, "frame")},
-                                            {"verdicts", shipped::list(verdicts_of_frames(verdicts), "frame")}})
-      .at("trajectory")
-      .as<Trajectory>();
+  return output<Trajectory>(
+      "track.trajectory", "trajectory",
+      {{"states", shipped::list(states, "frame")}, {"verdicts", shipped::list(verdicts_of_frames(verdicts), "frame")}});
 }
 
 TEST(Trajectory, TableIsTheSameUnderAnyLocale) {
@@ -85,7 +81,7 @@ TEST(Trajectory, TableOfTimeMotionAndDeviations) {
   EXPECT_NEAR(std::stod(cell(3, "along_mm")), 6, 1e-6);
   EXPECT_NEAR(std::stod(cell(3, "frontal_mm")), 0, 1e-6);
   EXPECT_NEAR(std::stod(cell(1, "axial_deg")), 0, 1e-9) << "motion from the first frame";
-  EXPECT_NEAR(std::stod(cell(2, "deviation_axial_deg")), marrow::degrees(0.1), 1e-6);
+  EXPECT_NEAR(std::stod(cell(2, "deviation_axial_deg")), degrees(0.1), 1e-6);
   EXPECT_NEAR(std::stod(cell(2, "deviation_along_mm")), 0.1, 1e-9);
   EXPECT_NEAR(std::stod(cell(1, "m14_mm")), 10, 1e-9);
   EXPECT_EQ(cell(1, "verdict") + " " + cell(2, "verdict"), "trusted doubtful");
@@ -93,8 +89,8 @@ TEST(Trajectory, TableOfTimeMotionAndDeviations) {
 }
 
 TEST(Trajectory, VerdictsOfOtherFramesAreRefused) {
-  EXPECT_EQ(marrow::test::message_of([&] { three_frames(2); }),
+  EXPECT_EQ(message_of([&] { three_frames(2); }),
             "the verdicts are of other frames than the states: 2 and 3; wire both to the same repetition");
 }
 
-}  // namespace trajectory_test
+}  // namespace marrow::test::trajectory_test

@@ -1,17 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <gtest/gtest.h>
-
-#include <cmath>
 #include <filesystem>
 #include <fstream>
 
-#include "shipped.hpp"
-#include "tests/harness/message_of.hpp"
 #include "wells.hpp"
 
-namespace evidence_test {
+namespace marrow::test::evidence_test {
 
-using marrow::Judgement, marrow::Pose, marrow::RigidTransform, marrow::Verdict;
 using wells::Trial, wells::Wells, wells::figure;
 
 TEST(VerdictEvidence, TheFiguresOfARightPoseAreSmall) {
@@ -61,13 +55,13 @@ TEST(VerdictEvidence, SaysHowFarTheOtherCostsPoseIs) {
   Trial trial;
   Pose contour = trial.pose;
   contour.world_from_model = trial.moved_by({0, 0, 7, 0, 0, 0});
-  trial.inputs["contour_pose"] = shipped::item(contour);
+  trial.inputs["contour_pose"] = item(contour);
   EXPECT_NEAR(figure(trial.verdict(), "contour_apart_deg"), 7, 1e-6);
   contour.world_from_model = trial.moved_by({0, 0, 0, 3, 0, 4});
-  trial.inputs["contour_pose"] = shipped::item(contour);
+  trial.inputs["contour_pose"] = item(contour);
   EXPECT_NEAR(figure(trial.verdict(), "contour_apart_mm"), 5, 1e-6);
   // Without it, the stage 'first' takes its place.
-  marrow::List<Pose> stages;
+  List<Pose> stages;
   stages.add("start", trial.pose);
   stages.add("first", contour);
   trial.inputs.erase("contour_pose");
@@ -76,18 +70,16 @@ TEST(VerdictEvidence, SaysHowFarTheOtherCostsPoseIs) {
 }
 
 /// An outline of two straight borders, each with an edge pixel beside each point.
-struct Borders : marrow::OutlineProjector {
-  std::vector<marrow::OutlinePoint> points;
-  std::vector<marrow::OutlinePoint> outline(const marrow::Camera&, const RigidTransform&, double) const override {
-    return points;
-  }
+struct Borders : OutlineProjector {
+  std::vector<OutlinePoint> points;
+  std::vector<OutlinePoint> outline(const Camera&, const RigidTransform&, double) const override { return points; }
 };
 
 TEST(VerdictEvidence, MeasuresTheOutlineAgainstTheEdges) {
   Trial trial;
   Borders borders;
-  marrow::List<marrow::EdgeMap> edges;
-  marrow::EdgeMap map;
+  List<EdgeMap> edges;
+  EdgeMap map;
   map.width_px = map.height_px = 200;
   // The right border lies 1 px off its edges on the upper half, and has none on the lowest tenth.
   for (int v = 50; v < 150; ++v)
@@ -100,23 +92,21 @@ TEST(VerdictEvidence, MeasuresTheOutlineAgainstTheEdges) {
     }
   for (const char* name : {"frontal", "lateral"}) edges.add(name, map);
   trial.inputs["edges"] = shipped::list(edges, "view");
-  trial.inputs["projector"] = marrow::Value::of<marrow::OutlineProjector>(std::make_shared<const Borders>(borders));
+  trial.inputs["projector"] = Value::of<OutlineProjector>(std::make_shared<const Borders>(borders));
   const Verdict verdict = trial.verdict();
   // A pixel is 0.8 mm at 800 mm from the source; the bone is about 6 mm farther away.
   EXPECT_NEAR(figure(verdict, "outline_part_mm"), 0.8, 0.05);
   EXPECT_LT(figure(verdict, "outline_spread_mm"), 0.05);
   EXPECT_NEAR(figure(verdict, "unexplained"), 0.05, 0.015);
-  marrow::List<marrow::EdgeMap> of_others;
-  of_others.add("oblique", map);
-  trial.inputs["edges"] = shipped::list(of_others, "view");
-  trial.inputs["cost"] = marrow::Value::of<marrow::Cost>(std::make_shared<const Wells>(trial.cost));
+  trial.inputs["edges"] = per_view("oblique", map);
+  trial.inputs["cost"] = Value::of<Cost>(std::make_shared<const Wells>(trial.cost));
   EXPECT_EQ(shipped::refusal("verdict.evidence", trial.inputs),
             "view 'frontal': there is no edge map of that name; make the edges from the same list of views");
 }
 
 /// Everything below z = -40 mm of the model is bone.
-marrow::SignedField floor_of_bone() {
-  marrow::SignedField field;
+SignedField floor_of_bone() {
+  SignedField field;
   field.grid.size = {3, 3, 3};
   field.grid.spacing_mm = {100, 100, 100};
   field.grid.origin_mm = {-100, -100, -100};
@@ -129,13 +119,11 @@ TEST(VerdictEvidence, SeesThatBonesIntersect) {
   Trial trial;
   Pose other = trial.pose;
   other.world_from_model = trial.moved_by({0, 0, 0, 0, 0, 6});  // its bone ends at z = -34, and the box at -50
-  marrow::List<Pose> others;
-  marrow::List<marrow::SignedField> bones;
+  List<Pose> others;
   others.add("distal", trial.pose);
   others.add("proximal", other);
-  bones.add("proximal", floor_of_bone());
   trial.inputs["others"] = shipped::list(others, "fragment");
-  trial.inputs["other_bones"] = shipped::list(bones, "fragment");
+  trial.inputs["other_bones"] = per_fragment("proximal", floor_of_bone());
   EXPECT_NEAR(figure(trial.verdict(), "intersection_mm"), 16, 0.5);
   trial.inputs.erase("other_bones");
   EXPECT_EQ(shipped::refusal("verdict.evidence", trial.inputs),
@@ -150,7 +138,7 @@ struct ModelFile {
     std::ofstream(path) << text;
   }
   ~ModelFile() { std::filesystem::remove(path); }
-  shipped::Options options() const { return {{"failure_model", path}}; }
+  Options options() const { return {{"failure_model", path}}; }
 };
 
 std::string model_of(double bias, const std::string& terms) {
@@ -161,7 +149,7 @@ std::string model_of(double bias, const std::string& terms) {
 TEST(VerdictEvidence, TheModelGivesTheProbability) {
   Trial trial;
   trial.pose.warnings = {"one", "two", "three"};
-  trial.inputs["pose"] = shipped::item(trial.pose);
+  trial.inputs["pose"] = item(trial.pose);
   // log odds = bias + 2 log(1 + 3 / 1), and 0.5 log(1 + 4 / 2) for a figure that is absent
   const std::string terms =
       "  - {figure: warnings, scale: 1, weight: 2, absent: 0}\n"
@@ -191,10 +179,10 @@ TEST(VerdictEvidence, SaysWhatThePredictedDeviationsLeaveOpen) {
   Trial trial;
   const auto verdict_with = [&](double deviation_mm, bool is_refined) {
     Pose pose = trial.pose;
-    pose.covariance.emplace(marrow::Matrix6d::Zero());
+    pose.covariance.emplace(Matrix6d::Zero());
     pose.covariance->diagonal().tail<3>().setConstant(deviation_mm * deviation_mm);
-    trial.inputs["pose"] = shipped::item(pose);
-    marrow::List<Pose> stages;
+    trial.inputs["pose"] = item(pose);
+    List<Pose> stages;
     stages.add("last", trial.pose);
     if (is_refined) trial.inputs["stages"] = shipped::list(stages, "stage");
     return trial.verdict(model.options());
@@ -210,7 +198,7 @@ TEST(VerdictEvidence, SaysWhatThePredictedDeviationsLeaveOpen) {
       << refined.reasons[0];
   EXPECT_EQ(
       refined.remedies,
-      (std::vector<std::string>{
+      (Strings{
           "a check of what was given: the bone, the side, which image belongs to which camera, the signs of its angles",
           "cameras that are known better, by a calibration; then give refine.cameras smaller rotation_deg, shift_mm, "
           "focal_percent and centre_px"}));
@@ -222,17 +210,15 @@ TEST(VerdictEvidence, APoseInAnotherBoneIsDoubtful) {
   Trial trial;
   Pose other = trial.pose;
   other.world_from_model = trial.moved_by({0, 0, 0, 0, 0, 6});
-  marrow::List<Pose> others;
-  marrow::List<marrow::SignedField> bones;
+  List<Pose> others;
   others.add("proximal", other);
-  bones.add("proximal", floor_of_bone());
   trial.inputs["others"] = shipped::list(others, "fragment");
-  trial.inputs["other_bones"] = shipped::list(bones, "fragment");
+  trial.inputs["other_bones"] = per_fragment("proximal", floor_of_bone());
   const ModelFile model(model_of(-9, "  - {figure: warnings, scale: 1, weight: 1, absent: 0}\n"));
-  shipped::Options options = model.options();
+  Options options = model.options();
   const Verdict verdict = trial.verdict(options);
   EXPECT_EQ(verdict.judgement, Judgement::doubtful);
-  EXPECT_EQ(verdict.reasons, std::vector<std::string>{"the bone reaches 16.0 mm into another bone"});
+  EXPECT_EQ(verdict.reasons, Strings{"the bone reaches 16.0 mm into another bone"});
   options["max_intersection_mm"] = 20.0;
   EXPECT_EQ(trial.verdict(options).judgement, Judgement::trusted);
 }
@@ -242,11 +228,11 @@ TEST(VerdictEvidence, WithoutAModelAPoseIsDoubtful) {
   const Verdict verdict = trial.verdict();
   EXPECT_EQ(verdict.judgement, Judgement::doubtful);
   EXPECT_TRUE(std::isnan(verdict.failure_probability));
-  EXPECT_EQ(verdict.reasons, std::vector<std::string>{"there is no failure model, so the figures are not judged"});
+  EXPECT_EQ(verdict.reasons, Strings{"there is no failure model, so the figures are not judged"});
 }
 
 std::string refusal(const std::string& text) {
-  return marrow::test::message_of([&] { Trial().verdict(ModelFile(text).options()); });
+  return message_of([&] { Trial().verdict(ModelFile(text).options()); });
 }
 
 TEST(VerdictEvidence, SaysWhatIsWrongWithAModel) {
@@ -267,44 +253,41 @@ TEST(VerdictEvidence, SaysWhatIsWrongWithAModel) {
 }
 
 /// The images say nothing about it, with or without a sentence that says so.
-struct Blind : marrow::Cost {
+struct Blind : Cost {
   std::string said;
   explicit Blind(std::string text) : said(std::move(text)) {}
   double value(const RigidTransform&) const override { return 0.5; }
   std::string nothing_compared(const RigidTransform&) const override { return said; }
-  std::shared_ptr<const marrow::Cost> at_level(const marrow::CostLevel&) const override {
-    return std::make_shared<Blind>(*this);
-  }
+  std::shared_ptr<const Cost> at_level(const CostLevel&) const override { return std::make_shared<Blind>(*this); }
 };
 
 TEST(VerdictEvidence, APoseOfWhichTheImagesSayNothingIsWrong) {
   Trial trial;
   const ModelFile model(model_of(-9, "  - {figure: warnings, scale: 1, weight: 1, absent: 0}\n"));
-  const auto verdict_on = [&](const std::string& said, const shipped::Options& options) {
-    trial.inputs["cost"] = marrow::Value::of<marrow::Cost>(std::make_shared<const Blind>(said));
-    return shipped::call("verdict.evidence", trial.inputs, options).at("verdict").as<Verdict>();
+  const auto verdict_on = [&](const std::string& said, const Options& options) {
+    trial.inputs["cost"] = Value::of<Cost>(std::make_shared<const Blind>(said));
+    return output<Verdict>("verdict.evidence", "verdict", trial.inputs, options);
   };
-  for (const shipped::Options& options : {shipped::Options(), model.options()}) {
+  for (const Options& options : {Options(), model.options()}) {
     const Verdict verdict = verdict_on("view 'frontal': it shows nothing of the bone", options);
     EXPECT_EQ(verdict.judgement, Judgement::wrong);
     EXPECT_EQ(verdict.failure_probability, 1);
     EXPECT_EQ(verdict.reasons,
-              std::vector<std::string>{
-                  "the images say nothing about this pose: view 'frontal': it shows nothing of the bone"});
+              Strings{"the images say nothing about this pose: view 'frontal': it shows nothing of the bone"});
   }
-  EXPECT_EQ(verdict_on("", model.options()).reasons,
-            std::vector<std::string>{
-                "the images say nothing about this pose: the cost is the same at all poses within 16 degrees and mm"});
+  EXPECT_EQ(
+      verdict_on("", model.options()).reasons,
+      Strings{"the images say nothing about this pose: the cost is the same at all poses within 16 degrees and mm"});
 }
 
 TEST(VerdictEvidence, DeviationsOfZeroAreNoKnowledge) {
   const ModelFile model(model_of(-9, "  - {figure: warnings, scale: 1, weight: 1, absent: 0}\n"));
   Trial trial;
-  trial.pose.covariance.emplace(marrow::Matrix6d::Zero());
-  trial.inputs["pose"] = shipped::item(trial.pose);
+  trial.pose.covariance.emplace(Matrix6d::Zero());
+  trial.inputs["pose"] = item(trial.pose);
   const Verdict verdict = trial.verdict(model.options());
   EXPECT_EQ(verdict.judgement, Judgement::wrong);
   EXPECT_EQ(verdict.failure_probability, 1);
 }
 
-}  // namespace evidence_test
+}  // namespace marrow::test::evidence_test

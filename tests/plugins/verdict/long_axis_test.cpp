@@ -2,25 +2,21 @@
 // The long axis is that of the bone's surface, whatever axes a pose came with. A box lies along an oblique direction.
 // Its covariance is given about the CT's axes; what it means about the box's own follows by hand: both have the same
 // origin, so C' = Q C Q^T of each 3 x 3 block, with the box's axes in the columns of Q.
-#include <gtest/gtest.h>
-
-#include <cmath>
-
 #include "tests/plugins/verdict/wells.hpp"
 
-namespace long_axis_test {
+namespace marrow::test::long_axis_test {
 
-using marrow::Matrix6d, marrow::Pose, marrow::Vector6d, marrow::Verdict, wells::figure;
+using wells::figure;
 
 /// Turns z into an oblique direction.
-Eigen::Matrix3d turn() { return marrow::rotation_from_vector({0.5, -0.6, 0.2}); }
+Matrix3d turn() { return rotation_from_vector({0.5, -0.6, 0.2}); }
 
 /// 20 x 24 x 100 mm about the origin, along the third column of turn().
-marrow::Mesh oblique_box() {
-  marrow::Mesh mesh;
+Mesh oblique_box() {
+  Mesh mesh;
   for (const double z : {-50, 50})
     for (const double y : {-12, 12})
-      for (const double x : {-10, 10}) mesh.vertices_mm.push_back(turn() * Eigen::Vector3d(x, y, z));
+      for (const double x : {-10, 10}) mesh.vertices_mm.push_back(turn() * Vector3d(x, y, z));
   mesh.triangles = {{0, 2, 1}, {1, 2, 3}, {4, 5, 6}, {5, 7, 6}, {0, 1, 4}, {1, 5, 4},
                     {2, 6, 3}, {3, 6, 7}, {0, 4, 2}, {2, 4, 6}, {1, 3, 5}, {3, 7, 5}};
   return mesh;
@@ -30,8 +26,8 @@ marrow::Mesh oblique_box() {
 Pose known_to(double axial_deg) {
   constexpr double kOther = 0.05;
   Vector6d variance = Vector6d::Constant(kOther * kOther);
-  variance.head<3>() *= marrow::radians(1) * marrow::radians(1);
-  variance[2] = std::pow(marrow::radians(axial_deg), 2);
+  variance.head<3>() *= radians(1) * radians(1);
+  variance[2] = std::pow(radians(axial_deg), 2);
   Matrix6d q = Matrix6d::Zero();
   q.topLeftCorner<3, 3>() = q.bottomRightCorner<3, 3>() = turn();
   Pose pose;
@@ -41,9 +37,9 @@ Pose known_to(double axial_deg) {
 }
 
 Verdict verdict_on(const Pose& pose, const Pose* prior = nullptr) {
-  shipped::Inputs inputs{{"pose", shipped::item(pose)}, {"model", shipped::item(oblique_box())}};
-  if (prior) inputs["prior"] = shipped::item(*prior);
-  return shipped::call("verdict.predicted", inputs).at("verdict").as<Verdict>();
+  Inputs inputs{{"pose", item(pose)}, {"model", item(oblique_box())}};
+  if (prior) inputs["prior"] = item(*prior);
+  return output<Verdict>("verdict.predicted", "verdict", inputs);
 }
 
 TEST(LongAxis, ThePredictedDeviationIsAboutTheBonesAxis) {
@@ -59,7 +55,7 @@ TEST(LongAxis, ThePredictedDeviationIsAboutTheBonesAxis) {
 TEST(LongAxis, SoIsTheDifferenceFromAPrior) {
   const Pose pose = known_to(3);
   Pose prior = known_to(5);
-  prior.world_from_model.rotation = marrow::rotation_from_vector(marrow::radians(12) * turn().col(2));
+  prior.world_from_model.rotation = rotation_from_vector(radians(12) * turn().col(2));
   const Verdict verdict = verdict_on(pose, &prior);
   EXPECT_NEAR(figure(verdict, "prior_axial_deg"), 12, 1e-6);
   EXPECT_NEAR(figure(verdict, "prior_axial_deviations"), 12 / std::sqrt(25.0 - 9.0), 1e-6);
@@ -67,11 +63,11 @@ TEST(LongAxis, SoIsTheDifferenceFromAPrior) {
 
 TEST(LongAxis, APriorMayHaveOtherAxesThanThePose) {
   const Pose pose = known_to(3), prior = known_to(5);
-  const Pose turned = in_frame(prior, {Eigen::Vector3d(30, -20, 100), marrow::rotation_from_vector({1, 2, -1})});
+  const Pose turned = in_frame(prior, {Vector3d(30, -20, 100), rotation_from_vector({1, 2, -1})});
   EXPECT_NEAR(figure(verdict_on(pose, &turned), "prior_axial_deviations"), 0, 1e-6);
   Pose away = turned;
-  away.world_from_model.rotation = marrow::rotation_from_vector(marrow::radians(12) * turn().col(2));
+  away.world_from_model.rotation = rotation_from_vector(radians(12) * turn().col(2));
   EXPECT_NEAR(figure(verdict_on(pose, &away), "prior_axial_deviations"), 12 / std::sqrt(25.0 - 9.0), 1e-6);
 }
 
-}  // namespace long_axis_test
+}  // namespace marrow::test::long_axis_test

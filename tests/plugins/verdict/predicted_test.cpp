@@ -1,33 +1,26 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <gtest/gtest.h>
-
-#include <cmath>
-
-#include "tests/plugins/evaluate/listener.hpp"
 #include "tests/plugins/verdict/wells.hpp"
 
-namespace predicted_test {
+namespace marrow::test::predicted_test {
 
-using marrow::Judgement, marrow::Verdict, wells::figure;
-using Texts = std::vector<std::string>;
+using wells::figure;
+using Texts = Strings;
 
 /// A box of 20 x 20 x 100 mm about the origin.
-marrow::Mesh box() { return marrow::test::box({0, 0, 0}, {20, 20, 100}); }
+Mesh box() { return test::box({0, 0, 0}, {20, 20, 100}); }
 
 /// A pose with standard deviations about (degrees) and along (mm) the box's axes.
-marrow::Pose pose_with(const marrow::Vector6d& deviations) {
-  marrow::Pose pose;
-  pose.world_from_model.rotation = marrow::rotation_from_vector({0.1, -0.7, 1.3});
+Pose pose_with(const Vector6d& deviations) {
+  Pose pose;
+  pose.world_from_model.rotation = rotation_from_vector({0.1, -0.7, 1.3});
   pose.world_from_model.translation_mm = {10, -20, 800};
-  pose.covariance = marrow::Matrix6d::Zero();
-  for (int i = 0; i < 6; ++i)
-    (*pose.covariance)(i, i) = std::pow(i < 3 ? marrow::radians(deviations[i]) : deviations[i], 2);
+  pose.covariance = Matrix6d::Zero();
+  for (int i = 0; i < 6; ++i) (*pose.covariance)(i, i) = std::pow(i < 3 ? radians(deviations[i]) : deviations[i], 2);
   return pose;
 }
 
-Verdict verdict_of(const marrow::Pose& pose, const shipped::Options& options = {}) {
-  const auto outputs =
-      shipped::call("verdict.predicted", {{"pose", shipped::item(pose)}, {"model", shipped::item(box())}}, options);
+Verdict verdict_of(const Pose& pose, const Options& options = {}) {
+  const auto outputs = call("verdict.predicted", {{"pose", item(pose)}, {"model", item(box())}}, options);
   return outputs.at("verdict").as<Verdict>();
 }
 
@@ -74,15 +67,15 @@ TEST(VerdictPredicted, SaysWhichDirectionIsNotKnownAndWhatWouldSettleIt) {
 }
 
 TEST(VerdictPredicted, IsWrongAboveHalf) {
-  const marrow::Pose pose = pose_with({0, 0, 15, 0, 0, 0});  // above 5 degrees with probability 0.74
+  const Pose pose = pose_with({0, 0, 15, 0, 0, 0});  // above 5 degrees with probability 0.74
   EXPECT_EQ(verdict_of(pose).judgement, Judgement::wrong);
   EXPECT_EQ(verdict_of(pose, {{"wrong_above", 0.9}}).judgement, Judgement::doubtful);
   EXPECT_EQ(verdict_of(pose, {{"doubtful_above", 0.9}, {"wrong_above", 0.95}}).judgement, Judgement::trusted);
-  EXPECT_TRUE(shipped::declares("verdict.predicted", marrow::below("doubtful_above", "wrong_above")));
+  EXPECT_TRUE(declares("verdict.predicted", below("doubtful_above", "wrong_above")));
 }
 
 TEST(VerdictPredicted, WithoutPredictionItIsDoubtful) {
-  marrow::Pose pose = pose_with(marrow::Vector6d::Zero());
+  Pose pose = pose_with(Vector6d::Zero());
   pose.covariance.reset();
   const Verdict verdict = verdict_of(pose);
   EXPECT_EQ(verdict.judgement, Judgement::doubtful);
@@ -93,7 +86,7 @@ TEST(VerdictPredicted, WithoutPredictionItIsDoubtful) {
 }
 
 TEST(VerdictPredicted, AnUndeterminedPoseIsWrong) {
-  const Verdict verdict = verdict_of(pose_with(marrow::Vector6d::Constant(HUGE_VAL)));
+  const Verdict verdict = verdict_of(pose_with(Vector6d::Constant(HUGE_VAL)));
   EXPECT_EQ(verdict.judgement, Judgement::wrong);
   EXPECT_EQ(verdict.failure_probability, 1);
   EXPECT_EQ(verdict.reasons, Texts{"the images do not determine the pose in every direction"});
@@ -101,7 +94,7 @@ TEST(VerdictPredicted, AnUndeterminedPoseIsWrong) {
 }
 
 TEST(VerdictPredicted, AWarningMakesItDoubtful) {
-  marrow::Pose pose = pose_with({0.1, 0.1, 0.5, 0.1, 0.1, 0.1});
+  Pose pose = pose_with({0.1, 0.1, 0.5, 0.1, 0.1, 0.1});
   pose.warnings = {"the search ended at its limit"};
   const Verdict verdict = verdict_of(pose);
   EXPECT_EQ(verdict.judgement, Judgement::doubtful);
@@ -111,22 +104,19 @@ TEST(VerdictPredicted, AWarningMakesItDoubtful) {
 }
 
 TEST(VerdictPredicted, IsTheSameEachTime) {
-  const marrow::Pose pose = pose_with({1, 1, 4, 1, 1, 1});
-  EXPECT_EQ(marrow::hash_of(verdict_of(pose)), marrow::hash_of(verdict_of(pose)));
+  const Pose pose = pose_with({1, 1, 4, 1, 1, 1});
+  EXPECT_EQ(hash_of(verdict_of(pose)), hash_of(verdict_of(pose)));
 }
 
 /// The verdict on a pose that is known well, with this distance of its outline from the edges in the second of two
 /// views.
-Verdict verdict_beside_edges(double median_px, const shipped::Options& options = {}) {
-  marrow::Metrics distance;
+Verdict verdict_beside_edges(double median_px, const Options& options = {}) {
+  Metrics distance;
   distance.items = {{"median_px", 0.5, "px"}, {"first_median_px", 0.4, "px"}, {"second_median_px", median_px, "px"}};
-  return shipped::call("verdict.predicted",
-                       {{"pose", shipped::item(pose_with({0.1, 0.1, 0.5, 0.1, 0.1, 0.1}))},
-                        {"model", shipped::item(box())},
-                        {"distance", shipped::item(distance)}},
-                       options)
-      .at("verdict")
-      .as<Verdict>();
+  return output<Verdict>(
+      "verdict.predicted", "verdict",
+      {{"pose", item(pose_with({0.1, 0.1, 0.5, 0.1, 0.1, 0.1}))}, {"model", item(box())}, {"distance", item(distance)}},
+      options);
 }
 
 TEST(VerdictPredicted, AnOutlineBesideTheEdgesMakesItDoubtful) {
@@ -141,23 +131,19 @@ TEST(VerdictPredicted, AnOutlineBesideTheEdgesMakesItDoubtful) {
 }
 
 TEST(VerdictPredicted, ADistanceOfNoViewIsRefused) {
-  EXPECT_EQ(shipped::refusal("verdict.predicted", {{"pose", shipped::item(pose_with({0.1, 0.1, 0.5, 0.1, 0.1, 0.1}))},
-                                                   {"model", shipped::item(box())},
-                                                   {"distance", shipped::item(marrow::Metrics())}}),
+  EXPECT_EQ(refusal("verdict.predicted", {{"pose", item(pose_with({0.1, 0.1, 0.5, 0.1, 0.1, 0.1}))},
+                                          {"model", item(box())},
+                                          {"distance", item(Metrics())}}),
             "the distance has no figure of a view, such as frontal_median_px; wire evaluate.outline_distance");
 }
 
 /// The verdict on a pose with a cost of 1, beside another pose.
-Verdict beside(double apart_deg, double cost, const shipped::Options& options = {}) {
-  marrow::Pose pose = pose_with({0.1, 0.1, 0.5, 0.1, 0.1, 0.1}), other = pose;
+Verdict beside(double apart_deg, double cost, const Options& options = {}) {
+  Pose pose = pose_with({0.1, 0.1, 0.5, 0.1, 0.1, 0.1}), other = pose;
   pose.cost = 1, other.cost = cost;
-  other.world_from_model.rotation =
-      marrow::rotation_from_vector({0, marrow::radians(apart_deg), 0}) * pose.world_from_model.rotation;
-  return shipped::call(
-             "verdict.predicted",
-             {{"pose", shipped::item(pose)}, {"model", shipped::item(box())}, {"other", shipped::item(other)}}, options)
-      .at("verdict")
-      .as<Verdict>();
+  other.world_from_model.rotation = rotation_from_vector({0, radians(apart_deg), 0}) * pose.world_from_model.rotation;
+  return output<Verdict>("verdict.predicted", "verdict",
+                         {{"pose", item(pose)}, {"model", item(box())}, {"other", item(other)}}, options);
 }
 
 TEST(VerdictPredicted, AnotherPoseThatFitsNearlyAsWellMakesItDoubtful) {
@@ -172,36 +158,30 @@ TEST(VerdictPredicted, AnotherPoseThatFitsNearlyAsWellMakesItDoubtful) {
 }
 
 TEST(VerdictPredicted, RefusesAnotherBonesSurface) {
-  marrow::Mesh mesh = box();
+  Mesh mesh = box();
   mesh.frame = "elsewhere";
   EXPECT_EQ(
-      shipped::refusal("verdict.predicted",
-                       {{"pose", shipped::item(pose_with({0, 0, 1, 0, 0, 1}))}, {"model", shipped::item(mesh)}}),
+      refusal("verdict.predicted", {{"pose", item(pose_with({0, 0, 1, 0, 0, 1}))}, {"model", item(mesh)}}),
       "the model is in the frame 'elsewhere', but the pose takes points in 'ct'; give the model that was registered");
 }
 
 /// A prior that is turned by an angle about the long axis against a pose.
-marrow::Pose prior_of(const marrow::Pose& pose, double turned_deg, double deviation_deg) {
-  marrow::Pose prior = pose_with({1, 1, deviation_deg, 3, 3, 3});
-  marrow::Vector6d turn = marrow::Vector6d::Zero();
-  turn[2] = marrow::radians(turned_deg);
-  prior.world_from_model = marrow::moved(pose.world_from_model, pose.frame, turn);
+Pose prior_of(const Pose& pose, double turned_deg, double deviation_deg) {
+  Pose prior = pose_with({1, 1, deviation_deg, 3, 3, 3});
+  Vector6d turn = Vector6d::Zero();
+  turn[2] = radians(turned_deg);
+  prior.world_from_model = moved(pose.world_from_model, pose.frame, turn);
   return prior;
 }
-Verdict verdict_of(const marrow::Pose& pose, const marrow::Pose& prior, marrow::Context context = marrow::Context(),
-                   const shipped::Options& options = {}) {
-  return shipped::call(
-             "verdict.predicted",
-             {{"pose", shipped::item(pose)}, {"model", shipped::item(box())}, {"prior", shipped::item(prior)}}, options,
-             context)
-      .at("verdict")
-      .as<Verdict>();
+Verdict verdict_of(const Pose& pose, const Pose& prior, Context context = Context(), const Options& options = {}) {
+  return output<Verdict>("verdict.predicted", "verdict",
+                         {{"pose", item(pose)}, {"model", item(box())}, {"prior", item(prior)}}, options, context);
 }
 
 TEST(VerdictPredicted, APriorThatContradictsTheImagesMakesAPoseDoubtful) {
   // The pose is known to 3 degrees, the prior to 5: they differ by 4 = sqrt(5^2 - 3^2) degrees, give or take.
-  const marrow::Pose pose = pose_with({0.1, 0.1, 3, 0.1, 0.1, 0.1});
-  listener::Listener listener;
+  const Pose pose = pose_with({0.1, 0.1, 3, 0.1, 0.1, 0.1});
+  Heard listener;
   const Verdict verdict = verdict_of(pose, prior_of(pose, -20, 5), listener.context, {{"doubtful_above", 0.3}});
   EXPECT_EQ(verdict.judgement, Judgement::doubtful);
   EXPECT_NEAR(figure(verdict, "prior_axial_deg"), 20, 1e-6);
@@ -216,40 +196,38 @@ TEST(VerdictPredicted, APriorThatContradictsTheImagesMakesAPoseDoubtful) {
 }
 
 TEST(VerdictPredicted, APriorThatAgreesChangesNoJudgement) {
-  const marrow::Pose pose = pose_with({0.1, 0.1, 0.5, 0.1, 0.1, 0.1});
-  listener::Listener listener;
+  const Pose pose = pose_with({0.1, 0.1, 0.5, 0.1, 0.1, 0.1});
+  Heard listener;
   const Verdict verdict = verdict_of(pose, prior_of(pose, 6, 5), listener.context);
   EXPECT_EQ(verdict.judgement, Judgement::trusted);
   EXPECT_NEAR(figure(verdict, "prior_axial_deviations"), 6 / std::sqrt(25 - 0.25), 1e-6);
   EXPECT_TRUE(listener.warnings.empty());
   // The limit is an option.
-  EXPECT_EQ(verdict_of(pose, prior_of(pose, 6, 5), marrow::Context(), {{"contradicts_above", 1.2}}).judgement,
+  EXPECT_EQ(verdict_of(pose, prior_of(pose, 6, 5), Context(), {{"contradicts_above", 1.2}}).judgement,
             Judgement::doubtful);
 }
 
 TEST(VerdictPredicted, WhereTheImagesSayNothingThereIsNothingToCompare) {
-  const marrow::Pose pose = pose_with({0.1, 0.1, 4.99, 0.1, 0.1, 0.1});
+  const Pose pose = pose_with({0.1, 0.1, 4.99, 0.1, 0.1, 0.1});
   const Verdict verdict = verdict_of(pose, prior_of(pose, 20, 5));
   EXPECT_TRUE(std::isnan(figure(verdict, "prior_axial_deviations")));
   EXPECT_NEAR(figure(verdict, "prior_axial_deg"), 20, 1e-6);
 }
 
 TEST(VerdictPredicted, APriorNeedsACovariance) {
-  const marrow::Pose pose = pose_with({0.1, 0.1, 0.5, 0.1, 0.1, 0.1});
-  marrow::Pose prior = prior_of(pose, 0, 5);
+  const Pose pose = pose_with({0.1, 0.1, 0.5, 0.1, 0.1, 0.1});
+  Pose prior = prior_of(pose, 0, 5);
   prior.covariance.reset();
-  EXPECT_EQ(shipped::refusal(
-                "verdict.predicted",
-                {{"pose", shipped::item(pose)}, {"model", shipped::item(box())}, {"prior", shipped::item(prior)}}),
+  EXPECT_EQ(refusal("verdict.predicted", {{"pose", item(pose)}, {"model", item(box())}, {"prior", item(prior)}}),
             "the prior has no covariance; take it from a node that predicts one, such as a fit of markers");
 }
 
 TEST(VerdictPredicted, DeviationsOfZeroAreNoKnowledge) {
-  const Verdict verdict = verdict_of(pose_with(marrow::Vector6d::Zero()));
+  const Verdict verdict = verdict_of(pose_with(Vector6d::Zero()));
   EXPECT_EQ(verdict.judgement, Judgement::wrong);
   EXPECT_EQ(verdict.failure_probability, 1);
   EXPECT_EQ(verdict.reasons, Texts{"the predicted deviations are 0, so the registration compared nothing"});
   EXPECT_EQ(verdict.remedies, Texts{"a start nearer to the bone, and a look at the masks and edges of each view"});
 }
 
-}  // namespace predicted_test
+}  // namespace marrow::test::predicted_test

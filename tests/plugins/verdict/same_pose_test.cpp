@@ -1,18 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 // The verdict depends on the pose, not on the way to it. The costs are wells about given poses, so the end of each
 // search is known.
-#include <gtest/gtest.h>
-
-#include <cmath>
 #include <filesystem>
 #include <fstream>
 
-#include "shipped.hpp"
 #include "wells.hpp"
 
-namespace same_pose_test {
+namespace marrow::test::same_pose_test {
 
-using marrow::Judgement, marrow::Pose, marrow::Verdict;
 using wells::Trial, wells::figure;
 
 /// A failure model in which only the distance by contour and the number of warnings count.
@@ -31,38 +26,35 @@ Trial with_second_cost(double turned_deg) {
   Trial trial;
   trial.second.views = {{{trial.moved_by({0, 0, turned_deg, 0, 0, 0}), 0.9}},
                         {{trial.moved_by({0, 0, turned_deg, 0, 0, 0}), 0.9}}};
-  trial.inputs["contour_cost"] = marrow::Value::of<marrow::Cost>(std::make_shared<const wells::Wells>(trial.second));
+  trial.inputs["contour_cost"] = Value::of<Cost>(std::make_shared<const wells::Wells>(trial.second));
   return trial;
 }
 
-marrow::Value stages_by(const Trial& trial, double first_turned_deg) {
+Value stages_by(const Trial& trial, double first_turned_deg) {
   Pose first = trial.pose;
   first.world_from_model = trial.moved_by({0, 0, first_turned_deg, 0, 0, 0});
-  marrow::List<Pose> stages;
-  stages.add("first", first);
-  stages.add("final", trial.pose);
-  return shipped::list(stages, "stage");
+  return shipped::list(named("first", first, "final", trial.pose), "stage");
 }
 
 TEST(SamePose, WhereTheFirstSearchEndedDoesNotCount) {
   Trial trial = with_second_cost(1);
-  const shipped::Options options{{"failure_model", model(-5)}};
+  const Options options{{"failure_model", model(-5)}};
   trial.inputs["stages"] = stages_by(trial, 0);
   const Verdict one = trial.verdict(options);
   trial.inputs["stages"] = stages_by(trial, 9);
   const Verdict other = trial.verdict(options);
-  EXPECT_EQ(marrow::hash_of(one), marrow::hash_of(other));
+  EXPECT_EQ(hash_of(one), hash_of(other));
   EXPECT_NEAR(figure(one, "contour_apart_deg"), 1, 0.05);
 }
 
 TEST(SamePose, ATenthOfADegreeIsTheSamePose) {
-  const shipped::Options options{{"failure_model", model(-5)}};
-  std::vector<double> found;
+  const Options options{{"failure_model", model(-5)}};
+  Numbers found;
   for (const double off : {-0.1, 0.0, 0.1}) {
     Trial trial = with_second_cost(3);
     Pose pose = trial.pose;
     pose.world_from_model = trial.moved_by({off, -off, off, 0.3 * off, 0, -0.3 * off});
-    trial.inputs["pose"] = shipped::item(pose);
+    trial.inputs["pose"] = item(pose);
     found.push_back(trial.verdict(options).failure_probability);
   }
   // log odds -5 + 0.5 log(1 + 3): a tenth of a degree changes them by 0.5 * 0.1 / 4.
@@ -72,7 +64,7 @@ TEST(SamePose, ATenthOfADegreeIsTheSamePose) {
 
 TEST(SamePose, APoseFromWhichASecondCostLeadsAwayAsFarAsAFailureIsDoubtful) {
   Trial trial = with_second_cost(7.6);
-  const shipped::Options options{{"failure_model", model(-9)}};  // the model alone trusts it
+  const Options options{{"failure_model", model(-9)}};  // the model alone trusts it
   const Verdict verdict = trial.verdict(options);
   EXPECT_LT(verdict.failure_probability, 0.001);
   EXPECT_EQ(verdict.judgement, Judgement::doubtful);
@@ -91,4 +83,4 @@ TEST(SamePose, SoIsOneFromWhichItsOwnCostLeadsAway) {
   EXPECT_EQ(verdict.reasons.at(0), "the cost leads to a pose 3.00 mm away; both cannot be right");
 }
 
-}  // namespace same_pose_test
+}  // namespace marrow::test::same_pose_test

@@ -1,32 +1,27 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 // A box, a cost with wells at given poses, and a pose to judge by them.
-#include <cmath>
+#include "tests/harness/node_test.hpp"
 
-#include "shipped.hpp"
-#include "tests/framework/domain/shapes.hpp"
+namespace marrow::test::wells {
 
-namespace wells {
-
-using marrow::Pose, marrow::RigidTransform, marrow::Vector6d, marrow::Verdict;
-
-inline marrow::Mesh box() { return marrow::test::box({0, 0, 0}, {30, 20, 100}); }
+inline Mesh box() { return test::box({0, 0, 0}, {30, 20, 100}); }
 
 /// A cost with wells: in each view it is 1 - the deepest of depth * exp(-(distance / 10)^2), where the distance from a
 /// well's pose counts a degree as a millimetre.
-struct Wells : marrow::Cost {
+struct Wells : Cost {
   struct Well {
     RigidTransform pose;
     double depth;
   };
   std::vector<std::vector<Well>> views;
-  marrow::FragmentFrame frame = marrow::fragment_frame(box());
+  FragmentFrame frame = fragment_frame(box());
 
   double value_in_view(std::size_t view, const RigidTransform& pose) const override {
     double least = 1;
     for (const Well& well : views[view]) {
       Vector6d motion = motion_between(well.pose, pose, frame);
-      motion.head<3>() *= marrow::degrees(1);
+      motion.head<3>() *= degrees(1);
       least = std::min(least, 1 - well.depth * std::exp(-motion.squaredNorm() / 100));
     }
     return least;
@@ -37,19 +32,16 @@ struct Wells : marrow::Cost {
     return sum / double(views.size());
   }
   std::size_t view_count() const override { return views.size(); }
-  std::shared_ptr<const marrow::Cost> at_level(const marrow::CostLevel&) const override {
-    return std::make_shared<Wells>(*this);
-  }
+  std::shared_ptr<const Cost> at_level(const CostLevel&) const override { return std::make_shared<Wells>(*this); }
 };
 
 /// Looks along an axis of the world from 800 mm, with a detector behind it.
-inline marrow::View view_along(const std::string& name, const Eigen::Vector3d& turn_deg) {
-  marrow::View view;
+inline View view_along(const std::string& name, const Vector3d& turn_deg) {
+  View view;
   view.name = name;
   view.camera.width_px = view.camera.height_px = 200;
   view.camera.intrinsics << 1000, 0, 99.5, 0, 1000, 99.5, 0, 0, 1;
-  view.camera.camera_from_world = {"camera", "world", marrow::rotation_from_vector(marrow::radians(1) * turn_deg),
-                                   Eigen::Vector3d(0, 0, 800)};
+  view.camera.camera_from_world = {"camera", "world", rotation_from_vector(radians(1) * turn_deg), Vector3d(0, 0, 800)};
   view.image.pixels = cv::Mat(200, 200, CV_16UC1, cv::Scalar(1000));
   return view;
 }
@@ -57,36 +49,36 @@ inline marrow::View view_along(const std::string& name, const Eigen::Vector3d& t
 struct Trial {
   Wells cost, second;  ///< `second` is for a test to use
   Pose pose;
-  shipped::Inputs inputs;
-  marrow::List<marrow::View> views;
+  Inputs inputs;
+  List<View> views;
 
   Trial() {
-    pose.world_from_model.rotation = marrow::rotation_from_vector({0.1, 0.3, -0.2});
+    pose.world_from_model.rotation = rotation_from_vector({0.1, 0.3, -0.2});
     pose.world_from_model.translation_mm = {4, -3, 6};
     pose.frame = cost.frame;
     cost.views = {{{pose.world_from_model, 0.9}}, {{pose.world_from_model, 0.9}}};
     views.add("frontal", view_along("frontal", {0, 0, 0}));
     views.add("lateral", view_along("lateral", {0, 90, 0}));
-    inputs = {{"pose", shipped::item(pose)},
-              {"optimizer", shipped::call("optimizer.bobyqa", {}).at("optimizer")},
+    inputs = {{"pose", item(pose)},
+              {"optimizer", call("optimizer.bobyqa", {}).at("optimizer")},
               {"views", shipped::list(views, "view")},
-              {"model", shipped::item(box())}};
+              {"model", item(box())}};
   }
   RigidTransform moved_by(const std::array<double, 6>& deg_and_mm) const {
     Vector6d motion = Vector6d::Map(deg_and_mm.data());
-    motion.head<3>() *= marrow::radians(1);
+    motion.head<3>() *= radians(1);
     return moved(pose.world_from_model, cost.frame, motion);
   }
-  Verdict verdict(const shipped::Options& options = {}) {
-    inputs["cost"] = marrow::Value::of<marrow::Cost>(std::make_shared<const Wells>(cost));
-    return shipped::call("verdict.evidence", inputs, options).at("verdict").as<Verdict>();
+  Verdict verdict(const Options& options = {}) {
+    inputs["cost"] = Value::of<Cost>(std::make_shared<const Wells>(cost));
+    return output<Verdict>("verdict.evidence", "verdict", inputs, options);
   }
 };
 
 inline double figure(const Verdict& verdict, const std::string& name) {
-  for (const marrow::Metric& one : verdict.figures)
+  for (const Metric& one : verdict.figures)
     if (one.name == name) return one.value;
   return std::nan("");
 }
 
-}  // namespace wells
+}  // namespace marrow::test::wells

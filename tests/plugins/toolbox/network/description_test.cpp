@@ -1,15 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "marrow/toolbox/network/description.hpp"
-
-#include <gtest/gtest.h>
-
 #include "harness/message_of.hpp"
 #include "written.hpp"
 
-namespace description_test {
+namespace marrow::test::description_test {
 
-using namespace marrow;
-using namespace marrow::test;
 using network::Output, network::read_description;
 
 std::string fault_of(const std::string& text) {
@@ -34,7 +29,7 @@ TEST(NetworkDescription, IsRead) {
   ASSERT_EQ(read.outputs.size(), 2u);
   EXPECT_EQ(read.outputs[0].channels(), 3);
   const Output& maps = network::output_of(read, Output::Kind::heat_maps);
-  EXPECT_EQ(maps.names, (std::vector<std::string>{"a", "b"}));
+  EXPECT_EQ(maps.names, (Strings{"a", "b"}));
   EXPECT_EQ(maps.stride_px, 4);
   EXPECT_EQ(maps.deviation_factor, 1.5);
   EXPECT_NE(message_of([&] {
@@ -84,4 +79,4 @@ INSTANTIATE_TEST_SUITE_P(
         Fault{"edge_strength: {layer: maps,", "classes: {layer: maps,",
               "expected the names of its channels, got none"}));
 
-}  // namespace description_test
+}  // namespace marrow::test::description_test

@@ -1,19 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "marrow/toolbox/network/inference.hpp"
-
-#include <gtest/gtest.h>
 #include <tbb/global_control.h>
-
 #include <opencv2/imgproc.hpp>
-#include <random>
 
 #include "harness/message_of.hpp"
+#include "marrow/toolbox/network/inference.hpp"
 #include "written.hpp"
 
-namespace inference_test {
+namespace marrow::test::inference_test {
 
-using namespace marrow;
-using namespace marrow::test;
 using network::Network, network::read_description;
 
 /// A kernel without symmetry.
@@ -121,4 +115,4 @@ TEST(Inference, SaysWhatIsWrongWithAModel) {
          "has values that are not finite (NaN or infinity); the training may have diverged");
 }
 
-}  // namespace inference_test
+}  // namespace marrow::test::inference_test

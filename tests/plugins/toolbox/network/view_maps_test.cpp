@@ -1,18 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <gtest/gtest.h>
-
 #include <opencv2/imgproc.hpp>
 
 #include "harness/message_of.hpp"
 #include "marrow/toolbox/network/inference.hpp"
-#include "shipped.hpp"
 #include "tests/plugins/edges/drawn.hpp"
 #include "written.hpp"
 
-namespace view_maps_test {
+namespace marrow::test::view_maps_test {
 
-using namespace marrow;
-using namespace marrow::test;
 using network::Normalisation;
 
 /// The value itself.
@@ -106,9 +101,8 @@ TEST(NetworkNodes, KeepWhatTheNetworkSees) {
   // Nearly 1 above a line integral of 0.5, nearly 0 below.
   const Written written(Convolution{.side = 1, .weights = {100}, .bias = {-50}}.bytes(),
                         with(with(kPlain, "activation: none", "activation: sigmoid"), "grey_values", "line_integrals"));
-  const auto option = [&] { return shipped::Options{{"network", written.file().string()}}; };
-  const EdgeMap edges =
-      shipped::call("edges.network", {{"view", shipped::item(view)}}, option()).at("edges").as<EdgeMap>();
+  const auto option = [&] { return Options{{"network", written.file().string()}}; };
+  const EdgeMap edges = shipped::output<EdgeMap>("edges.network", "edges", {{"view", item(view)}}, option());
   ASSERT_GT(edges.pixels.size(), 60u);
   for (const EdgePixel& pixel : edges.pixels)
     EXPECT_NEAR(std::hypot(pixel.u_px - 115, pixel.v_px - 80), 25, 1.0) << "only the disc that the network sees";
@@ -117,10 +111,9 @@ TEST(NetworkNodes, KeepWhatTheNetworkSees) {
                         with(with(kPlain, "edge_strength: {layer: maps, activation: none}",
                                   "classes: {layer: maps, names: [bone, metal], activation: softmax}"),
                              "grey_values", "line_integrals"));
-  shipped::Options options{
-      {"network", classes.file().string()}, {"leave_out", std::vector<std::string>{"metal"}}, {"margin_px", 2}};
+  Options options{{"network", classes.file().string()}, {"leave_out", Strings{"metal"}}, {"margin_px", 2}};
   const auto masked = [&] {
-    return shipped::call("mask.network", {{"view", shipped::item(view)}}, options).at("view").as<View>().mask;
+    return shipped::output<View>("mask.network", "view", {{"view", item(view)}}, options).mask;
   };
   const cv::Mat mask = masked();
   const auto at = [&](int u, int v) { return int(mask.at<std::uint8_t>(v, u)); };
@@ -128,8 +121,8 @@ TEST(NetworkNodes, KeepWhatTheNetworkSees) {
   EXPECT_EQ(at(115, 80 + 26), 0) << "the margin";
   EXPECT_EQ(at(115, 80 + 29), 255);
   EXPECT_EQ(at(45, 80), 255);
-  options["leave_out"] = std::vector<std::string>{"metals"};
+  options["leave_out"] = Strings{"metals"};
   EXPECT_NE(message_of(masked).find("the network has no class 'metals'; did you mean 'metal'?"), std::string::npos);
 }
 
-}  // namespace view_maps_test
+}  // namespace marrow::test::view_maps_test
