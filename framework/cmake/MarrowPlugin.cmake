@@ -55,8 +55,8 @@ function(marrow_add_plugin name)
   endif()
 endfunction()
 
-# marrow_write_not_built(FILE): the nodes that ONLY_WITH has left out so far, each with its option, as JSON. No file where
-# there are none. `marrow doctor` and `marrow check` tell them.
+# marrow_write_not_built(FILE): the nodes that ONLY_WITH has left out so far, each with its option, as JSON. No file
+# where there are none. `marrow doctor` and `marrow check` tell them.
 function(marrow_write_not_built file)
   get_property(nodes GLOBAL PROPERTY MARROW_NOT_BUILT)
   file(REMOVE ${file})

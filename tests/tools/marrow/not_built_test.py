@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Nodes that are not there: options of CMake leave out those of large libraries, and a method may be a choice of another
-node."""
+"""Nodes that are not there: options of CMake leave out those of large libraries, and a method may be a choice of
+another node."""
 import json
 import subprocess
 
@@ -36,7 +36,9 @@ class NotBuilt(Case):
     def fault(self, node):
         result = self.marrow("check", self.write("p.yaml", PIPELINE % node))
         self.assertEqual(result.returncode, 2)
-        return result.stderr.splitlines()[0].split("error: ")[1], result.stderr.splitlines()[1].strip()
+        (error,) = [line.split("error: ")[1] for line in result.stderr.splitlines() if "error: " in line]
+        (hint,) = [line.strip() for line in result.stderr.splitlines() if line.strip().startswith("hint: ")]
+        return error, hint
 
     def test_a_pipeline_with_one_names_the_option(self):
         self.assertEqual(

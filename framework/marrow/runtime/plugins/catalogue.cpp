@@ -90,7 +90,7 @@ void Catalogue::enter_not_built() {
     try {
       const auto nodes = nlohmann::json::parse(read_text_file(file, most_bytes), nullptr, false);
       for (const auto& [node, option] : nodes.items())
-        if (nodes.is_object() && option.is_string() && !find(node)) not_built_.emplace(node, option);
+        if (nodes.is_object() && option.is_string() && !find(node)) not_built_.emplace(node, option.get<std::string>());
     } catch (const Error&) {  // it only helps with hints
     }
   }
