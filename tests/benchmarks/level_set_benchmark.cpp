@@ -61,6 +61,11 @@ Context logging() {
   return Context(hooks);
 }
 
+void print(const std::string& what, const phantom::Accuracy& a) {
+  std::printf("%-34s Dice %.4f  bias %+.3f mm  mean %.3f mm  rms %.3f mm  largest %.2f mm  (%zu points)\n",
+              what.c_str(), a.dice, a.bias_mm, a.mean_mm, a.rms_mm, a.largest_mm, a.points);
+}
+
 /// Both fragments as one body for Dice, each fragment's surface for distances.
 void print_accuracy(const phantom::DistalEnd& bone, const List<SignedField>& fields) {
   for (std::size_t f = 0; f < fields.size(); ++f) {
@@ -69,11 +74,10 @@ void print_accuracy(const phantom::DistalEnd& bone, const List<SignedField>& fie
     // The canal's mouth at the volume's end is no surface of the bone.
     const auto not_the_end = [](const Eigen::Vector3d& p) { return p.z() < 90; };
     const auto at_fracture = [&](const Eigen::Vector3d& p) { return std::abs(bone.over_cut_mm(p)) < 2.5; };
-    phantom::print("  " + fields.name(f), phantom::compare(fields[f], truth, not_the_end));
-    phantom::print("    outer surface", phantom::compare(fields[f], truth, [&](const auto& p) {
-                     return not_the_end(p) && !at_fracture(p);
-                   }));
-    phantom::print("    fracture", phantom::compare(fields[f], truth, at_fracture));
+    print("  " + fields.name(f), phantom::compare(fields[f], truth, not_the_end));
+    print("    outer surface",
+          phantom::compare(fields[f], truth, [&](const auto& p) { return not_the_end(p) && !at_fracture(p); }));
+    print("    fracture", phantom::compare(fields[f], truth, at_fracture));
   }
 }
 

@@ -7,6 +7,7 @@
 #include <cstring>
 #include <thread>
 
+#include "tests/harness/node_test.hpp"
 #include "tests/plugins/project/made.hpp"
 
 namespace marrow::test::opencl_test {
@@ -22,6 +23,7 @@ Function* next(const char* name) {
 
 }  // namespace marrow::test::opencl_test
 
+namespace opencl_test = marrow::test::opencl_test;
 extern "C" {
 
 cl_int clGetPlatformIDs(cl_uint room, cl_platform_id* platforms, cl_uint* count) {
@@ -62,7 +64,7 @@ cl_int clGetProgramBuildInfo(cl_program program, cl_device_id device, cl_program
 }
 }
 
-namespace opencl_test {
+namespace marrow::test::opencl_test {
 
 /// A block of bone in air.
 Volume block() {
@@ -199,4 +201,4 @@ TEST_F(OpenCl, CallsAtTheSameTimeGiveTheSameBytes) {
   for (int i = 0; i < kPoses; ++i) EXPECT_EQ(together[std::size_t(i)], computed(i)) << i;
 }
 
-}  // namespace opencl_test
+}  // namespace marrow::test::opencl_test

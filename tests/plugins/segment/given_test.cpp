@@ -5,7 +5,6 @@
 
 namespace marrow::test::given_test {
 
-using message_of;
 
 using Distance = std::function<double(const Vector3d&)>;
 

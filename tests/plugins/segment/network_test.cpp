@@ -8,9 +8,6 @@
 
 namespace marrow::test::network_test {
 
-using Convolution;
-using with;
-using Written;
 
 constexpr const char* kNode = "segment.network";
 constexpr double kThreshold_hu = 600;

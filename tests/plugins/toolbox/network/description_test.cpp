@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "marrow/toolbox/network/description.hpp"
 #include "harness/message_of.hpp"
+#include "harness/node_test.hpp"
 #include "written.hpp"
 
 namespace marrow::test::description_test {

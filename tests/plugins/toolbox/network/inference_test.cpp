@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <tbb/global_control.h>
 #include <opencv2/imgproc.hpp>
+#include <random>
 
 #include "harness/message_of.hpp"
 #include "marrow/toolbox/network/inference.hpp"
