@@ -165,7 +165,7 @@ class ResultsPageTest(ResultsBench, PageTest):
         self.assertEqual(self.text(".says"), "They begin to differ at the node edges (edges.canny).")
         cells = self.texts('[data-change="edges.noise_high"] > *')
         self.assertEqual(cells, ["edges", "option noise_high", "5", "9", "the first difference"])
-        self.eventually(lambda: self.all(".wipe img", "one.naturalWidth"), [96, 96])
+        self.eventually(lambda: self.all(".wipe img", "one.naturalWidth"), 4 * [96])  # of both views in both runs
         self.browser.key("HOME", ".wiped input")
         self.assertEqual(self.the(".wipe", "one.style.getPropertyValue('--at')"), "0%")
         self.assertIn("marrow diff runs/first runs/second", self.text("body"))

@@ -172,12 +172,14 @@ class ByKeysTest(WholeWay):
 
     def go(self, slices, wanted, more):
         """Moves the crosshair until these slices show the wanted one. `more` raises or lowers the number."""
-        shown = lambda: int(self.the("[data-slice=%s]" % slices, "one.dataset.shown"))
+        # -1 while a slice is being fetched.
+        shown = lambda: int(self.the("[data-slice=%s]" % slices, "one.dataset.shown || '-1'"))
+        self.until(lambda: shown() >= 0)
         begin, less = shown(), LESS[more]
         if begin == wanted:
             return
         self.keys(more)
-        self.until(lambda: shown() != begin)
+        self.until(lambda: shown() not in (begin, -1))
         if shown() < begin:
             more, less = less, more
         way = wanted - shown()
