@@ -2,8 +2,8 @@
 #include <marrow/domain/mesh.hpp>
 #include <marrow/plugin.hpp>
 
-#include "poisson_surface.hpp"
 #include "marrow/mesh/signs.hpp"
+#include "poisson_surface.hpp"
 
 namespace {
 

@@ -6,8 +6,8 @@
 #include <marrow/plugin.hpp>
 
 #include <marrow/domain/decompositions.hpp>
-#include "marrow/base/number_text.hpp"
 #include "closest_points.hpp"
+#include "marrow/base/number_text.hpp"
 
 namespace {
 

@@ -5,10 +5,10 @@
 #include <cmath>
 #include <marrow/plugin.hpp>
 
+#include "itk_contour.hpp"
 #include "marrow/base/number_text.hpp"
 #include "marrow/segment/expansion.hpp"
 #include "marrow/segment/fragments.hpp"
-#include "itk_contour.hpp"
 #include "marrow/segment/seed_points.hpp"
 #include "marrow/toolbox/field/interior.hpp"
 

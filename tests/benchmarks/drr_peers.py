@@ -64,7 +64,7 @@ def picture(path, reference, images):
 
 def main():
     if not shutil.which("plastimatch") or not (BUILD / "bin" / "drr_benchmark").exists():
-        print("this benchmark needs plastimatch and drr_benchmark, one of which is not here: apt-get install plastimatch")
+        print("plastimatch or drr_benchmark is missing: apt-get install plastimatch")
         sys.exit(77)
     version = subprocess.run(["plastimatch", "--version"], capture_output=True, text=True).stdout.strip()
     with tempfile.TemporaryDirectory() as folder:

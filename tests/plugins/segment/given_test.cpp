@@ -5,7 +5,6 @@
 
 namespace marrow::test::given_test {
 
-
 using Distance = std::function<double(const Vector3d&)>;
 
 Distance sphere(double radius_mm, const Vector3d& centre) {

@@ -8,7 +8,6 @@
 
 namespace marrow::test::network_test {
 
-
 constexpr const char* kNode = "segment.network";
 constexpr double kThreshold_hu = 600;
 
