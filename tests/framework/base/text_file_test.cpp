@@ -42,7 +42,7 @@ TEST_F(TextFileTest, ReadsBackWhatItWrote) {
 }
 
 TEST_F(TextFileTest, SaysWhyItDoesNotRead) {
-  EXPECT_EQ(fault_in_reading(scratch.path / ""), " cannot be read: No such file or directory");
+  EXPECT_EQ(fault_in_reading(scratch.path / "none"), " cannot be read: No such file or directory");
   EXPECT_EQ(fault_in_reading(scratch.path), " is a folder, not a regular file");
   scratch.write("long", std::string(3000001, 'x'));
   EXPECT_EQ(fault_in_reading(scratch.path / "long", 3000000), " is longer than 3 MB");
