@@ -208,7 +208,7 @@ class Held(Documents):
 
     @unittest.skipIf(public_data is None, "needs the Debian packages python3-h5py, python3-pil and python3-scipy")
     def test_deepfluoro(self):
-        case = simulate(self.folder / "whole", pipeline="simulate-vertebra.yaml")
+        case = simulate(self.folder / "whole", pipeline="simulate/simulate-vertebra.yaml")
         public_data.deepfluoro_file([case], self.folder / "data.h5")
         self.run_section("A file of DeepFluoro")
 
