@@ -1,7 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "opencl_device.hpp"
 
+#include <signal.h>
+
 #include <algorithm>
+#include <array>
+#include <mutex>
 #include <sstream>
 
 #include "marrow/base/error.hpp"
@@ -9,6 +13,28 @@
 
 namespace marrow::opencl {
 namespace {
+
+/// Puts back how signals are handled: a device's compiler may take them over when it is used first. One at a time.
+class KeptSignals {
+ public:
+  KeptSignals() : lock_(mutex()) {
+    for (int signal = 1; signal < kEnd; ++signal) sigaction(signal, nullptr, &before_[std::size_t(signal)]);
+  }
+  ~KeptSignals() {
+    for (int signal = 1; signal < kEnd; ++signal) sigaction(signal, &before_[std::size_t(signal)], nullptr);
+  }
+  KeptSignals(const KeptSignals&) = delete;
+  KeptSignals& operator=(const KeptSignals&) = delete;
+
+ private:
+  static std::mutex& mutex() {
+    static std::mutex one;
+    return one;
+  }
+  static constexpr int kEnd = 32;  // the signals from here on belong to libraries
+  const std::scoped_lock<std::mutex> lock_;
+  std::array<struct sigaction, kEnd> before_{};
+};
 
 constexpr const char* kNoDevice =
     "no device with OpenCL is here; a driver for the graphics card, or Debian's package pocl-opencl-icd, provides one";
@@ -69,6 +95,7 @@ void check(cl_int code, const std::string& tried) {
 }
 
 Choice Device::choose(const std::string& name, const char* source) {
+  const KeptSignals signals;
   const std::vector<cl_device_id> all = devices();
   if (all.empty()) return {nullptr, kNoDevice};
   std::string known;

@@ -191,7 +191,7 @@ TEST(SimulateKneeImplant, SeedsGiveOtherSizes) {
 }
 
 // The maker of bones takes the surface that another node made, as it is but for its place.
-TEST(SimulateSurface, TakesASurfaceInPlaceOfAFile) {
+TEST(SimulateBones, TakesASurfaceInPlaceOfAFile) {
   const Mesh part = knee_implant({{"resolution_mm", 2.0}});
   const Bone made = output<Bone>("simulate.surface", "bone", {{"mesh", item(part)}},
                                  {{"long_bone", false}, {"isocentre_from_distal_end_mm", 20.0}});
