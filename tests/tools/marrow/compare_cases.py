@@ -58,15 +58,3 @@ class Compared(Case):
     def slow(self):
         """An experiment with a cell that hangs until its time limit."""
         return self.experiment("slow", "{hang: {m.how: hang}}")
-
-
-class Comparison(Compared):
-    """Its `marrow` takes the expected status first."""
-
-    def marrow(self, code, *arguments, **more):
-        result = super().marrow(*arguments, **more)
-        self.assertEqual(result.returncode, code, result.stdout + result.stderr)
-        return result
-
-    def expect(self, status, *arguments, **more):
-        return self.marrow(status, *arguments, **more)

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Options of a cost that the levels of a search replace are named where a pipeline gives them."""
-from compare_cases import Comparison
+from compare_cases import Compared
 from harness.program import main
 
 PIPELINE = """marrow: 1
@@ -32,19 +32,19 @@ REACH = (
 )
 
 
-class Replaced(Comparison):
+class Replaced(Compared):
     def setUp(self):
         super().setUp()
         self.write("p.yaml", PIPELINE)
 
     def notes(self, *arguments):
-        said = self.marrow(0, "check", "p.yaml", *arguments).stdout
+        said = self.expect(0, "check", "p.yaml", *arguments).stdout
         return [line[len("  note: ") :] for line in said.splitlines() if "does not count" in line]
 
     def test_it_is_said_with_the_lines_of_both(self):
         """The cost reaches the search through another cost. The node that only evaluates it replaces nothing."""
         self.assertEqual(self.notes(), [REACH])
-        said = self.marrow(0, "run", "p.yaml", "--out", "out")
+        said = self.expect(0, "run", "p.yaml", "--out", "out")
         self.assertEqual(said.stderr.count("marrow: note: %s\n" % REACH), 1)
         self.assertEqual((self.scratch / "out" / "log.txt").read_text().count("note: " + REACH), 1)
         self.write(
@@ -52,7 +52,7 @@ class Replaced(Comparison):
             "experiment: 1\npipeline: p.yaml\ncases: {folders: [cases/*]}\n"
             "metrics: [number.value]\nvariants: {a: {}, b: {number.value: 5}}\n",
         )
-        said = self.marrow(0, "compare", "e.yaml", "--dry-run")
+        said = self.expect(0, "compare", "e.yaml", "--dry-run")
         told = said.stderr.replace("%s/" % self.scratch, "")
         self.assertEqual(told.count("marrow: note: %s\n" % REACH), 1)
 
@@ -111,7 +111,7 @@ class Replaced(Comparison):
 
     def test_the_options_say_what_they_replace(self):
         told = "takes the place of 'reach_px', 'reach_mm' of the functions that reach this node"
-        self.assertIn(told, self.marrow(0, "inspect", "register.multiresolution").stdout)
+        self.assertIn(told, self.expect(0, "inspect", "register.multiresolution").stdout)
 
 
 if __name__ == "__main__":
