@@ -3,7 +3,6 @@
 // Calls nodes as they are shipped: by name, out of their libraries. So a test is compiled in a moment, and says no more
 // of a node than a pipeline could.
 #include <marrow/testing/node.hpp>
-#include <utility>
 
 namespace marrow::node_test {
 

@@ -1,20 +1,45 @@
-# marrow_add_kind(NAME [NODES node ...] [SOURCES file.cpp ...] [LINK library ...])
+# marrow_add_kind(NAME [NODES node ...] [SOURCES file.cpp ...] [LINK library ...]
+#   [MORE node ...] [MORE_LINK library ...] [SUITE file.cpp ...] [SUITE_LINK library ...])
 #
 # The shared library of a kind: kind.cpp, the nodes node.cpp and what else they need. Each node is one file that would
 # be a plugin by itself. Here several are compiled together, each in a namespace of its name, because most of a node's
-# time goes to headers and templates that all of them use. A node that brings a heavy library is a plugin of its own
-# (marrow_add_plugin), so that only its users load that library.
+# time goes to headers and templates that all of them use. MORE: nodes of a second library, marrow_NAME_more.so, so that
+# the first result does not wait for them. SUITE: the files of the kind's checks, which only `marrow conformance` needs,
+# in marrow_NAME_suite.so. A node that brings a heavy library is a plugin of its own (marrow_add_plugin), so that only
+# its users load that library.
 set(MARROW_TOGETHER ${CMAKE_CURRENT_LIST_DIR}/nodes_together.cmake)
 function(marrow_add_kind name)
-  cmake_parse_arguments(PARSE_ARGV 1 kind "" "" "NODES;SOURCES;LINK")
+  cmake_parse_arguments(PARSE_ARGV 1 kind "" "" "NODES;SOURCES;LINK;MORE;MORE_LINK;SUITE;SUITE_LINK")
   if(MARROW_LEFT_OUT)
     return()
   endif()
+  marrow_add_nodes(${name} NODES kind ${kind_NODES} SOURCES ${kind_SOURCES} LINK ${kind_LINK})
+  if(kind_MORE)
+    marrow_add_nodes(${name}_more NODES ${kind_MORE} LINK ${kind_LINK} ${kind_MORE_LINK})
+  endif()
+  if(kind_SUITE)
+    marrow_add_plugin(${name}_suite ${kind_SUITE} LINK ${kind_LINK} ${kind_SUITE_LINK})
+    marrow_compile_together(plugin_${name}_suite 8)
+    target_compile_options(plugin_${name}_suite PRIVATE $<$<CONFIG:Release>:-O1>)  # nobody feels the speed of checks
+  endif()
+  foreach(node ${kind_NODES})  # so that a node is asked for by its name, wherever it is
+    add_custom_target(plugin_${name}_${node})
+    add_dependencies(plugin_${name}_${node} plugin_${name})
+  endforeach()
+  foreach(node ${kind_MORE})
+    add_custom_target(plugin_${name}_${node})
+    add_dependencies(plugin_${name}_${node} plugin_${name}_more)
+  endforeach()
+endfunction()
+
+# A plugin of nodes that are compiled together.
+function(marrow_add_nodes name)
+  cmake_parse_arguments(PARSE_ARGV 1 kind "" "" "NODES;SOURCES;LINK")
   set(count 1)
   if(MARROW_UNITY)
     set(count 8)
   endif()
-  set(left kind ${kind_NODES})
+  set(left ${kind_NODES})
   list(JOIN left "," all)
   set(sources "")
   while(left)
@@ -33,8 +58,4 @@ function(marrow_add_kind name)
   marrow_add_plugin(${name} ${sources} ${kind_SOURCES} LINK ${kind_LINK})
   marrow_compile_together(plugin_${name} 8)
   set_source_files_properties(${sources} PROPERTIES SKIP_UNITY_BUILD_INCLUSION ON)
-  foreach(node ${kind_NODES})  # so that a node is asked for by its name, wherever it is
-    add_custom_target(plugin_${name}_${node})
-    add_dependencies(plugin_${name}_${node} plugin_${name})
-  endforeach()
 endfunction()

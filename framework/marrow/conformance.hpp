@@ -11,9 +11,6 @@
 #include <utility>
 #include <vector>
 
-#include "marrow/base/error.hpp"
-#include "marrow/base/export.hpp"
-#include "marrow/runtime/node/kind.hpp"
 #include "marrow/runtime/node/node.hpp"
 
 namespace MARROW_EXPORT marrow {
@@ -116,6 +113,12 @@ struct Suite {
   std::vector<Check> accuracy;
   /// Values of options by their names. A value is used if the node has that option.
   std::function<std::map<std::string, OptionValue>()> options = nullptr;
+
+  /// Adds a check of accuracy: the measured value must not exceed the limit.
+  void add(std::string name, std::string what, double limit, std::string unit,
+           std::function<double(const Subject&)> measure) {
+    accuracy.push_back({{std::move(name), std::move(what), limit, std::move(unit)}, std::move(measure)});
+  }
 };
 
 /// All checks of a suite: contract, determinism, threads, its trials, accuracy. They hold a copy of the suite, so the

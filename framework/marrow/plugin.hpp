@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// The only header that a plugin must include. A node is a plain function that is declared once:
+// The only header that a plugin must include. It brings all types of values, Eigen's matrices, OpenCV's and the parts
+// of the standard library below, which nearly every node uses. A node is a plain function that is declared once:
 //
 //   struct Options { double low = 50; };
 //   marrow::EdgeMap find(const marrow::View& view, const Options& options) { ... }
@@ -22,18 +23,86 @@
 // std::tuple of these, or a struct whose members are named with .out("port", &Struct::member, "help").
 //
 // A kind is the part of a node's name before the dot. A library may declare its own kinds (KindBuilder).
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
 #include <deque>
+#include <functional>
+#include <limits>
+#include <map>
+#include <memory>
+#include <opencv2/core.hpp>
+#include <optional>
 #include <string>
+#include <string_view>
+#include <tuple>
 #include <utility>
 #include <vector>
 
 #include "marrow/base/export.hpp"
+#include "marrow/base/number_text.hpp"
+#include "marrow/conformance.hpp"
 #include "marrow/runtime/node/abi.hpp"
-#include "marrow/runtime/node/kind_builder.hpp"
 #include "marrow/runtime/node/node_builder.hpp"
 #include "marrow/runtime/node/types.hpp"
 
 namespace MARROW_EXPORT marrow {
+
+/// A kind with its suite, as a loaded plugin registers it.
+struct KindDefinition {
+  KindInfo info;
+  std::vector<std::string> faults;  ///< what is wrong with the declaration itself
+  conformance::Suite suite;
+};
+
+namespace detail {
+/// Checks the declaration itself. Adds what is wrong to `faults`.
+void check_declaration(KindDefinition& kind);
+}  // namespace detail
+
+/// Declares a kind. Plugin::kind() returns this builder.
+///
+///   plugin.kind("edges")
+///       .summary("edge pixels of an X-ray view")
+///       .in<marrow::View>("view", "X-ray view")
+///       .out<marrow::EdgeMap>("edges", "edge pixels")
+///       .suite(edges_suite());
+class KindBuilder {
+ public:
+  explicit KindBuilder(KindDefinition& kind) : kind_(kind) {}
+  KindBuilder(const KindBuilder&) = delete;
+  KindBuilder& operator=(const KindBuilder&) = delete;
+  ~KindBuilder();
+
+  KindBuilder& summary(std::string text);
+  /// An input that nodes of the kind may have. If several types are given, a node takes one of them.
+  template <Registered... T>
+  KindBuilder& in(std::string name, std::string help, const Over& axis = {}) {
+    return add_input({std::move(name), std::move(help), {TypeInfo::of<T>()...}, std::string(axis.axis)});
+  }
+  /// An output that each node of the kind has, of one of the types.
+  template <Registered... T>
+  KindBuilder& out(std::string name, std::string help, const Over& axis = {}) {
+    return add_output({std::move(name), std::move(help), {TypeInfo::of<T>()...}, std::string(axis.axis)});
+  }
+  /// A property that nodes may declare with NodeBuilder::trait().
+  KindBuilder& trait(std::string name, std::string help);
+  /// Its nodes judge or show results, so they may be given the truth.
+  KindBuilder& sees_truth();
+  /// Its nodes are called in their own process if their options name files.
+  KindBuilder& runs_apart(Apart apart);
+  /// The checks that every node of the kind must pass in `marrow conformance`.
+  KindBuilder& suite(conformance::Suite suite);
+
+ private:
+  KindBuilder& add_input(KindPort port);
+  KindBuilder& add_output(KindPort port);
+
+  KindDefinition& kind_;
+};
 
 /// What a plugin library registers.
 class Plugin {
@@ -53,6 +122,8 @@ class Plugin {
 
   /// Declares a kind of nodes with its contract. The nodes of the kind may be in other libraries.
   KindBuilder kind(std::string name);
+  /// Gives a kind that another library declares its suite. So its nodes run where the suite is not built.
+  void suite(std::string kind, conformance::Suite suite);
 
   std::deque<NodeDefinition> nodes;
   std::deque<KindDefinition> kinds;

@@ -4,10 +4,9 @@
 #include <cmath>
 #include <marrow/plugin.hpp>
 
-#include "marrow/base/number_text.hpp"
-#include "marrow/camera/determined.hpp"
 #include "marrow/domain/quantile.hpp"
-#include "marrow/toolbox/calibration/correspondence.hpp"
+#include "marrow/toolbox/calibration/board.hpp"
+#include "marrow/toolbox/calibration/plausibility.hpp"
 #include "marrow/toolbox/draw/canvas.hpp"
 #include "marrow/toolbox/files/atomic_write.hpp"
 #include "marrow/toolbox/files/yaml_text.hpp"
@@ -15,9 +14,7 @@
 namespace {
 
 using namespace marrow;
-using calibration::CalibrationModel;
-using calibration::CalibrationResult;
-using calibration::ViewPoints;
+using calibration::CalibrationModel, calibration::CalibrationResult, calibration::ViewPoints;
 
 struct BeadBoardOptions {
   std::filesystem::path board;

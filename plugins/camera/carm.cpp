@@ -4,8 +4,6 @@
 // R_0 of each view. The relative motion of two views is R_21 = W_2^T W_1.
 #include <marrow/plugin.hpp>
 
-#include "marrow/domain/c_arm.hpp"
-
 namespace {
 
 struct Options {

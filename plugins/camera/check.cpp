@@ -8,7 +8,6 @@
 #include <marrow/plugin.hpp>
 
 #include <marrow/domain/decompositions.hpp>
-#include "marrow/base/number_text.hpp"
 #include "marrow/camera/points_file.hpp"
 #include "marrow/toolbox/calibration/plausibility.hpp"
 #include "marrow/toolbox/draw/canvas.hpp"

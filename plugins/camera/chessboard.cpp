@@ -6,10 +6,9 @@
 #include <marrow/plugin.hpp>
 #include <opencv2/calib3d.hpp>
 
-#include "marrow/base/number_text.hpp"
-#include "marrow/camera/determined.hpp"
 #include "marrow/toolbox/calibration/calibrate.hpp"
 #include "marrow/toolbox/calibration/chessboard.hpp"
+#include "marrow/toolbox/calibration/plausibility.hpp"
 
 namespace {
 

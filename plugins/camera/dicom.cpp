@@ -3,7 +3,7 @@
 #include <marrow/plugin.hpp>
 
 #include "marrow/base/names.hpp"
-#include "marrow/toolbox/files/escaped_name.hpp"
+#include "marrow/toolbox/files/input_file.hpp"
 #include "marrow/toolbox/files/xray_header.hpp"
 
 namespace {

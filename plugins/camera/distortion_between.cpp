@@ -4,8 +4,7 @@
 #include <marrow/plugin.hpp>
 
 #include "marrow/base/names.hpp"
-#include "marrow/base/number_text.hpp"
-#include "marrow/toolbox/distortion/arm.hpp"
+#include "marrow/toolbox/distortion/fit.hpp"
 
 namespace {
 

@@ -4,9 +4,7 @@
 #include <cmath>
 #include <marrow/plugin.hpp>
 
-#include "marrow/base/number_text.hpp"
 #include "marrow/camera/distortion_report.hpp"
-#include "marrow/toolbox/distortion/fit.hpp"
 #include "marrow/toolbox/distortion/plate.hpp"
 
 namespace {

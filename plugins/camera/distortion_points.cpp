@@ -3,7 +3,6 @@
 #include <marrow/plugin.hpp>
 
 #include "marrow/camera/distortion_report.hpp"
-#include "marrow/toolbox/distortion/fit.hpp"
 
 namespace {
 

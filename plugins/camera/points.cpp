@@ -9,10 +9,9 @@
 #include <marrow/plugin.hpp>
 
 #include "marrow/base/names.hpp"
-#include "marrow/base/number_text.hpp"
 #include "marrow/camera/points_file.hpp"
 #include "marrow/toolbox/calibration/plausibility.hpp"
-#include "marrow/toolbox/files/projection_camera.hpp"
+#include "marrow/toolbox/files/camera_file.hpp"
 
 namespace {
 

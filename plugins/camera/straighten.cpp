@@ -2,7 +2,7 @@
 // Takes a measured distortion out of a view.
 #include <marrow/plugin.hpp>
 
-#include "marrow/toolbox/distortion/straighten.hpp"
+#include "marrow/toolbox/distortion/distortion.hpp"
 
 namespace {
 

@@ -2,18 +2,13 @@
 // Checks for nodes of the kind camera. A node may compute cameras from images of a bead board, read them from the
 // headers of X-ray files, or compare them with known points. Each check runs only for nodes with its inputs and
 // options.
-#include "suite.hpp"
-
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
+#include <marrow/plugin.hpp>
 #include <random>
 
-#include "camera_files.hpp"
-#include "chessboard_sample.hpp"
-#include "marrow/base/number_text.hpp"
-#include "marrow/runtime/node/types.hpp"
-#include "plate_samples.hpp"
+#include "samples.hpp"
 
 namespace marrow::conformance {
 namespace {
@@ -335,8 +330,6 @@ std::vector<Trial> trials() {
       {"camera_without_focal_length", with_camera([](Camera& camera) { camera.intrinsics(0, 0) = 0; })}};
 }
 
-}  // namespace
-
 Suite camera_suite() {
   Suite suite{sample, validate, trials(), {}, options};
   const std::string board = "8 images of a bead board with 7 % pincushion distortion: ",
@@ -383,4 +376,7 @@ Suite camera_suite() {
   return suite;
 }
 
+}  // namespace
 }  // namespace marrow::conformance
+
+MARROW_PLUGIN(plugin) { plugin.suite("camera", marrow::conformance::camera_suite()); }

@@ -3,7 +3,6 @@
 // cameras contradict each other, only refine.cameras finds by how much; here the pose takes what least squares give it.
 #include <Eigen/Geometry>
 #include <cmath>
-#include <marrow/plugin.hpp>
 
 #include "marrow/deviations/outline_errors.hpp"
 #include "marrow/toolbox/geometry/camera_deviations.hpp"

@@ -4,7 +4,6 @@
 // direction of the border, they lie inside where metal is thin, the model's surface is a little off, and so are the
 // cameras.
 #include <cmath>
-#include <marrow/plugin.hpp>
 
 #include "marrow/deviations/outline_errors.hpp"
 #include "metal_rims.hpp"
@@ -109,11 +108,10 @@ MARROW_PLUGIN(plugin) {
       .out("pose", &deviations::Widened::pose,
            "the last pose; a covariance that is absent or not finite stays as it is")
       .out("stages", &deviations::Widened::stages, "all poses", over("stage"))
-      .option(
-          "offset_px", &Options::offset_px,
-          "standard deviation of the offset of the edges in a view from the offset that all views share, and of its "
-          "change with the border's direction",
-          at_least(0), at_most(50))
+      .option("offset_px", &Options::offset_px,
+              "standard deviation of the offset of the edges in a view from the offset that all views share, and of "
+              "its change with the border's direction",
+              at_least(0), at_most(50))
       .option("camera_px", &Options::camera_px,
               "standard deviation of the place of a camera's whole image, along each of its sides: the residual of its "
               "calibration where the bone lies",
@@ -129,12 +127,11 @@ MARROW_PLUGIN(plugin) {
               "how far from each other on the surface such errors are alike: where this far apart, their correlation "
               "is 0.61",
               at_least(0.1), at_most(1000))
-      .option(
-          "opaque_mm", &Options::opaque_mm,
-          "for metal of unknown opacity: the path through it behind which 1 / e of the radiation may arrive, such as "
-          "1.5 for steel and 5 for titanium. Edges then lie inside the outline where the path is short; a standard "
-          "deviation. 0: it is opaque, or no metal",
-          at_least(0), at_most(50))
+      .option("opaque_mm", &Options::opaque_mm,
+              "for metal of unknown opacity: the path through it behind which 1 / e of the radiation may arrive, such "
+              "as 1.5 for steel and 5 for titanium. Edges then lie inside the outline where the path is short; a "
+              "standard deviation. 0: it is opaque, or no metal",
+              at_least(0), at_most(50))
       .option("blur_px", &Options::blur_px,
               "with opaque_mm: standard deviation of the blur by the X-ray device and the edge extractor together",
               at_least(0.2), at_most(20));

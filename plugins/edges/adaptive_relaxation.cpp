@@ -6,14 +6,7 @@
 // smooth slope of a round thigh, where the gradient is not 0.
 #include <tbb/parallel_for.h>
 
-#include <algorithm>
-#include <cmath>
-#include <cstring>
-#include <marrow/plugin.hpp>
-
-#include "marrow/edges/gradient.hpp"
-#include "marrow/edges/refine.hpp"
-#include "marrow/edges/window.hpp"
+#include "marrow/edges/threshold.hpp"
 
 namespace {
 

@@ -4,13 +4,9 @@
 // images, bright and dark parts, and the smooth slope of a round thigh, where noise makes ridges.
 #include <tbb/parallel_for.h>
 
-#include <algorithm>
-#include <marrow/plugin.hpp>
 #include <opencv2/imgproc.hpp>
 
-#include "marrow/edges/gradient.hpp"
-#include "marrow/edges/refine.hpp"
-#include "marrow/edges/window.hpp"
+#include "marrow/edges/threshold.hpp"
 
 namespace {
 

@@ -30,13 +30,12 @@ marrow::EdgeMap gradient_mask(const marrow::View& view, const MaskOptions& optio
 }  // namespace
 
 MARROW_PLUGIN(plugin) {
-  declare_thresholds(
-      plugin.node("edges.gradient_mask", gradient_mask)
-          .summary("The mask of Sobel (1968), Prewitt (1970) or Roberts (1965) with thinning and one threshold, in "
-                   "multiples of the image's noise")
-          .option("mask", &MaskOptions::mask, "whose mask: 3 x 3 pixels, roberts 2 x 2",
-                  marrow::one_of({"sobel", "prewitt", "roberts"}))
-          .option("sigma_px", &MaskOptions::sigma_px,
-                  "standard deviation of the Gaussian that smooths the image first; 0: no smoothing",
-                  marrow::at_least(0), marrow::at_most(10)));
+  declare_thresholds(plugin.node("edges.gradient_mask", gradient_mask)
+                         .summary("The mask of Sobel (1968), Prewitt (1970) or Roberts (1965) with thinning and one "
+                                  "threshold, in multiples of the image's noise")
+                         .option("mask", &MaskOptions::mask, "whose mask: 3 x 3 pixels, roberts 2 x 2",
+                                 marrow::one_of({"sobel", "prewitt", "roberts"}))
+                         .option("sigma_px", &MaskOptions::sigma_px,
+                                 "standard deviation of the Gaussian that smooths the image first; 0: no smoothing",
+                                 marrow::at_least(0), marrow::at_most(10)));
 }

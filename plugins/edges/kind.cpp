@@ -1,13 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <marrow/plugin.hpp>
 
-#include "suite.hpp"
-
 MARROW_PLUGIN(plugin) {
+  using namespace marrow;
   plugin.kind("edges")
       .summary("edge pixels of an X-ray view")
-      .in<marrow::View>("view", "X-ray view")
-      .out<marrow::EdgeMap>("edges", "edge pixels at sub-pixel positions")
-      .runs_apart(marrow::Apart::computes)
-      .suite(marrow::conformance::edges_suite());
+      .in<View>("view", "X-ray view")
+      .out<EdgeMap>("edges", "edge pixels at sub-pixel positions")
+      .runs_apart(Apart::computes);
 }

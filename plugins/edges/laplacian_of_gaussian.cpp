@@ -3,7 +3,6 @@
 // positions. Noise makes zero crossings everywhere, so a zero crossing counts only if the gradient there is
 // significant. The Laplacian must fall along the gradient. Where it rises, the gradient has a minimum, not a maximum
 // (Clark, IEEE TPAMI 1989).
-#include <cmath>
 #include <opencv2/imgproc.hpp>
 
 #include "marrow/edges/threshold.hpp"

@@ -1,18 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 // Checks for edge extractors on images whose edges are known exactly: a disc and a bar, dark like bone, blurred by a
 // Gaussian, with noise.
-#include "suite.hpp"
-
-#include <algorithm>
-#include <cmath>
+#include <marrow/plugin.hpp>
 #include <random>
 
-#include "marrow/base/number_text.hpp"
 #include "marrow/domain/quantile.hpp"
-#include "marrow/runtime/node/types.hpp"
 
-namespace marrow::conformance {
 namespace {
+
+using namespace marrow;
+using namespace marrow::conformance;
 
 constexpr int kWidth = 240, kHeight = 200;
 // The contrast is so low that grey values and their logarithms have their edges at the same place.
@@ -188,16 +185,14 @@ std::vector<Trial> trials() {
            }}};
 }
 
-}  // namespace
-
-Suite edges_suite() {
+Suite suite_of_kind() {
   Suite suite{[] { return inputs_of(picture(disc())); }, validate, trials(), {}};
   for (const auto& [name, shape] : {std::pair<std::string, Shape>{"disc", disc()}, {"bar", bar()}}) {
     const std::string of = "edge of a " + name + ", blurred by 1.2 px, with noise of 2 % of its contrast";
     const auto add = [&, shape = shape](const std::string& what, const std::string& help, double limit,
                                         const std::string& unit, double (*measure)(const Subject&, const Shape&)) {
-      suite.accuracy.push_back({{name + "_" + what, of + ": " + help, limit, unit},
-                                [measure, shape](const Subject& subject) { return measure(subject, shape); }});
+      suite.add(name + "_" + what, of + ": " + help, limit, unit,
+                [measure, shape](const Subject& subject) { return measure(subject, shape); });
     };
     add("bias", "absolute value of the median signed distance", 0.2, "px", bias);
     add("spread", "half the width of the middle 95 % of the signed distances", 0.6, "px", spread);
@@ -208,4 +203,6 @@ Suite edges_suite() {
   return suite;
 }
 
-}  // namespace marrow::conformance
+}  // namespace
+
+MARROW_PLUGIN(plugin) { plugin.suite("edges", suite_of_kind()); }

@@ -3,10 +3,6 @@
 #include <cmath>
 #include <marrow/plugin.hpp>
 
-#include "marrow/domain/calibration.hpp"
-
-#include "marrow/base/number_text.hpp"
-
 namespace {
 
 using marrow::Calibration;

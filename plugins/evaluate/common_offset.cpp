@@ -7,8 +7,6 @@
 #include <marrow/base/names.hpp>
 #include <marrow/plugin.hpp>
 
-#include "marrow/base/number_text.hpp"
-
 namespace {
 
 using namespace marrow;
@@ -74,8 +72,7 @@ Metrics common_offset(const List<Metrics>& metrics, const Options& options, Cont
     result.items.push_back({"rest_" + name, common.rest, unit});
     if (stands_out)
       context.warn(
-          formatted("all {} frames have in common: {} {:.3g} {}, known to {:.2g}; without it they scatter by "
-                    "{:.2g}",
+          formatted("all {} frames have in common: {} {:.3g} {}, known to {:.2g}; without it they scatter by {:.2g}",
                     metrics.size(), name, common.mean, unit, common.error, common.rest));
   }
   return result;

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <marrow/plugin.hpp>
 
-#include "marrow/toolbox/field/bones_apart.hpp"
+#include "marrow/toolbox/field/interior.hpp"
 
 namespace {
 

@@ -6,7 +6,6 @@
 #include <limits>
 #include <marrow/plugin.hpp>
 
-#include "marrow/base/number_text.hpp"
 #include "marrow/toolbox/calibration/plausibility.hpp"
 #include "marrow/toolbox/exchange/deepfluoro_file.hpp"
 

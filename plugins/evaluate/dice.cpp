@@ -3,8 +3,6 @@
 // the voxels of the field.
 #include <marrow/plugin.hpp>
 
-#include "marrow/base/number_text.hpp"
-
 namespace {
 
 using namespace marrow;

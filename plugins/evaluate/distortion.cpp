@@ -5,10 +5,9 @@
 #include <cmath>
 #include <marrow/plugin.hpp>
 
-#include "marrow/base/number_text.hpp"
 #include "marrow/domain/quantile.hpp"
 #include "marrow/toolbox/distortion/distortion.hpp"
-#include "marrow/toolbox/distortion/plate_points.hpp"
+#include "marrow/toolbox/geometry/targets.hpp"
 
 namespace {
 
@@ -19,12 +18,6 @@ struct Options {
 };
 
 using Points = std::vector<Eigen::Vector2d>;
-
-double root_mean_square(const std::vector<double>& distances) {
-  double squares = 0;
-  for (const double distance : distances) squares += distance * distance;
-  return std::sqrt(squares / double(distances.size()));
-}
 
 Eigen::Vector2d mean_of(const Points& points) {
   Eigen::Vector2d sum = Eigen::Vector2d::Zero();
@@ -73,11 +66,12 @@ Metrics distortion_error(const distortion::Distortion& found, const distortion::
     return distances;
   };
   std::vector<double> errors = distances_from(straightened);
-  const double mean_square = root_mean_square(errors), worst = *std::max_element(errors.begin(), errors.end());
+  const double mean_square = geometry::root_mean_square(errors),
+               worst = *std::max_element(errors.begin(), errors.end());
   return {{{"error", mean_square, "px"},
            {"error_99", quantile_in_place(errors, 0.99), "px"},
            {"worst_error", worst, "px"},
-           {"uncorrected", root_mean_square(distances_from(seen)), "px"},
+           {"uncorrected", geometry::root_mean_square(distances_from(seen)), "px"},
            {"measured_share", 100 * double(straightened.size()) / double(truth.used.size()), "%"},
            {"validated", found.validated_px, "px"}}};
 }

@@ -6,7 +6,6 @@
 #include <limits>
 #include <marrow/plugin.hpp>
 
-#include "marrow/base/number_text.hpp"
 #include "marrow/domain/quantile.hpp"
 
 namespace {
@@ -37,8 +36,8 @@ Nearest nearest(const EdgePixel& to, const EdgeMap& edges) {
 Metrics edges(const EdgeMap& found, const EdgeMap& truth, const Options& options) {
   if (found.width_px != truth.width_px || found.height_px != truth.height_px)
     throw Error(
-        formatted("the edges are of an image of {} x {} pixels, but the true borders of one of {} x {}; "
-                  "compare edges of the same view",
+        formatted("the edges are of an image of {} x {} pixels, but the true borders of one of {} x {}; compare edges "
+                  "of the same view",
                   found.width_px, found.height_px, truth.width_px, truth.height_px));
   if (truth.pixels.empty()) throw Error("the image shows no true border, so there is nothing to compare");
   std::vector<double> across_px;

@@ -4,7 +4,6 @@
 #include <cmath>
 #include <marrow/plugin.hpp>
 
-#include "marrow/base/number_text.hpp"
 #include "marrow/domain/quantile.hpp"
 #include "marrow/toolbox/track/track_state.hpp"
 

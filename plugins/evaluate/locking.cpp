@@ -5,9 +5,7 @@
 #include <cmath>
 #include <marrow/plugin.hpp>
 
-#include "marrow/domain/c_arm.hpp"
 #include "marrow/toolbox/geometry/implant.hpp"
-#include "marrow/toolbox/geometry/locking_plan.hpp"
 
 namespace {
 

@@ -7,9 +7,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <marrow/plugin.hpp>
 
-#include "marrow/base/number_text.hpp"
 #include "marrow/domain/decompositions.hpp"
 #include "marrow/toolbox/search/search.hpp"
 
@@ -120,8 +118,8 @@ Result mirror_pose(const Pose& pose, const Cost& cost, const Optimizer& optimize
     return result;
   }
   context.info(
-      formatted("the mirror pose is {:.1f} degrees away; its cost is {:.4g}, that of the pose {:.4g}; the part "
-                "differs from its reflection by {:.2f} mm",
+      formatted("the mirror pose is {:.1f} degrees away; its cost is {:.4g}, that of the pose {:.4g}; the part differs "
+                "from its reflection by {:.2f} mm",
                 apart, result.pose.cost, own.cost, rest_mm));
   return result;
 }
@@ -132,8 +130,7 @@ MARROW_PLUGIN(plugin) {
   plugin.node("evaluate.mirror_pose", mirror_pose)
       .summary(
           "The mirror pose of a nearly symmetric part, such as a tibial tray: the other pose whose outline is nearly "
-          "the "
-          "same in one view; it is searched for, and both costs are given")
+          "the same in one view; it is searched for, and both costs are given")
       .in("pose", "pose found")
       .in("cost", "cost of a pose")
       .in("optimizer", "minimiser that refines the mirror pose")

@@ -6,9 +6,7 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
-#include <marrow/plugin.hpp>
 
-#include "marrow/base/number_text.hpp"
 #include "marrow/domain/quantile.hpp"
 #include "marrow/toolbox/match/inputs.hpp"
 #include "marrow/toolbox/match/nearest_edges.hpp"
@@ -99,8 +97,8 @@ Metrics outline_offset(const Pose& pose, const OutlineProjector& projector, cons
         projector.outline(view.camera, pose.world_from_model, options.contour_spacing_px), nearest, options);
     if (residuals.size() < kLeastPoints)
       throw Error(
-          formatted("view '{}': only {} points of the outline have an edge within {:g} px, and {} are needed; "
-                    "check the pose, or raise reach_px",
+          formatted("view '{}': only {} points of the outline have an edge within {:g} px, and {} are needed; check "
+                    "the pose, or raise reach_px",
                     view.name, residuals.size(), options.reach_px, kLeastPoints));
     const std::optional<Offset> offset = offset_of(residuals);
     if (!offset)
@@ -137,9 +135,8 @@ MARROW_PLUGIN(plugin) {
               at_most(100))
       .option("direction_tolerance_deg", &Options::direction_tolerance_deg,
               "largest angle between the directions of edge and outline", at_least(10), at_most(180))
-      .option(
-          "polarity", &Options::polarity,
-          "brighter_outside: edges count where the image is brighter outside the model; either: where it is darker, "
-          "too",
-          one_of({"brighter_outside", "either"}));
+      .option("polarity", &Options::polarity,
+              "brighter_outside: edges count where the image is brighter outside the model; either: where it is "
+              "darker, too",
+              one_of({"brighter_outside", "either"}));
 }

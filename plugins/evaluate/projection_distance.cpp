@@ -5,7 +5,6 @@
 #include <cmath>
 #include <marrow/plugin.hpp>
 
-#include "marrow/base/number_text.hpp"
 #include "marrow/toolbox/geometry/targets.hpp"
 
 namespace {

@@ -6,8 +6,6 @@
 #include <cmath>
 #include <marrow/plugin.hpp>
 
-#include "marrow/base/number_text.hpp"
-
 namespace {
 
 using marrow::LineSegment, marrow::List, marrow::ShaftLines, marrow::View;

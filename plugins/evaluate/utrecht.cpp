@@ -5,7 +5,6 @@
 #include <array>
 #include <marrow/plugin.hpp>
 
-#include "marrow/base/number_text.hpp"
 #include "marrow/toolbox/exchange/utrecht_file.hpp"
 
 namespace {
@@ -108,8 +107,7 @@ Metrics utrecht(const Options& options, Context& context) {
   }
   if (checked == 0)
     throw Error(
-        "no object has both a mask in 3D ('mask') and a mask in a projection ('masks'), so nothing can be "
-        "checked");
+        "no object has both a mask in 3D ('mask') and a mask in a projection ('masks'), so nothing can be checked");
   if (!faults.empty()) throw Error(faults);
   return metrics;
 }

@@ -1,11 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // The misalignment of a broken bone in the terms of surgeons. All figures are of the distal fragment relative to the
 // proximal one, compared with the CT, which shows both in place.
-#include <Eigen/Geometry>
-#include <cmath>
 #include <marrow/plugin.hpp>
 
-#include "marrow/base/number_text.hpp"
 #include "marrow/fracture/fracture_site.hpp"
 #include "marrow/toolbox/geometry/fragments.hpp"
 

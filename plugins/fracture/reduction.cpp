@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <cmath>
 #include <marrow/plugin.hpp>
 
 #include "marrow/toolbox/geometry/fragments.hpp"

@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <marrow/plugin.hpp>
-
-#include "marrow/toolbox/robotics/guide_state.hpp"
+#include "marrow/toolbox/robotics/robot_state.hpp"
 
 namespace {
 

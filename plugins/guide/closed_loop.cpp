@@ -1,34 +1,23 @@
 // SPDX-License-Identifier: Apache-2.0
 // Position-based visual servoing: brings the distal fragment to its place beside the proximal one. Both are found in
 // the same images. Where the robot stands need not be known, because its moves show it.
-#include <algorithm>
-#include <cmath>
-#include <marrow/plugin.hpp>
 
-#include "marrow/base/number_text.hpp"
-#include "marrow/guide/approach.hpp"
-#include "marrow/guide/relative_pose.hpp"
 #include "marrow/guide/servo.hpp"
 #include "marrow/toolbox/geometry/fragments.hpp"
-#include "marrow/toolbox/robotics/guide_state.hpp"
 #include "marrow/toolbox/robotics/robot_state.hpp"
 
 namespace {
 
 using namespace marrow;
-using guide::Leg;
-using guide::RelativePose;
-using robot::GuideState;
-using robot::RobotReport;
+using guide::Leg, guide::RelativePose;
+using robot::GuideState, robot::RobotReport;
 
 struct Options : geometry::FragmentPair, guide::StepLimits, guide::ApproachOptions, robot::HandEyeNoise {
   std::string hand_eye = "estimated";
   double astray_mm = 12;
-  double reduced_deg = 0.5;
-  double reduced_mm = 0.5;
+  double reduced_deg = 0.5, reduced_mm = 0.5;
   int max_pairs = 8;
-  double max_deviation_deg = 2;
-  double max_deviation_mm = 2;
+  double max_deviation_deg = 2, max_deviation_mm = 2;
 };
 
 struct Result {
@@ -129,10 +118,9 @@ void learn(GuideState& state, const RigidTransform& seen, const Eigen::Vector3d&
 List<Pose> predicted(const List<Pose>& poses, const List<Mesh>& models, const RigidTransform& motion,
                      const Vector6d& step, const Matrix6d& hand_eye, const Options& options) {
   constexpr double kLeast_deg = 0.5, kLeast_mm = 1;
-  List<Pose> result;
   const Pose& reference = geometry::pose_of(poses, options.reference);
-  for (std::size_t i = 0; i < poses.size(); ++i) {
-    Pose pose = geometry::with_own_axes(poses[i], poses.name(i), &models);
+  return poses.changed([&](Pose& pose, std::size_t i) {
+    pose = geometry::with_own_axes(pose, poses.name(i), &models);
     double turn = radians(kLeast_deg), shift = kLeast_mm;
     if (poses.name(i) == options.moved) {
       RigidTransform in_ct = motion;
@@ -147,9 +135,7 @@ List<Pose> predicted(const List<Pose>& poses, const List<Mesh>& models, const Ri
                           .finished()
                           .asDiagonal();
     pose.convergence.clear();
-    result.add(poses.name(i), pose);
-  }
-  return result;
+  });
 }
 
 /// The motion that the robot is told, and the motion that the images should show.

@@ -2,10 +2,8 @@
 // One move that reduces the fracture. Before it, the robot's place is calibrated with a target on its hand.
 #include <marrow/plugin.hpp>
 
-#include "marrow/base/number_text.hpp"
-#include "marrow/guide/relative_pose.hpp"
+#include "marrow/guide/servo.hpp"
 #include "marrow/toolbox/geometry/fragments.hpp"
-#include "marrow/toolbox/robotics/hand_eye.hpp"
 
 namespace {
 
@@ -13,8 +11,7 @@ using namespace marrow;
 
 struct Options : geometry::FragmentPair {
   std::string method = "ax_zb";
-  double max_deviation_deg = 2;
-  double max_deviation_mm = 2;
+  double max_deviation_deg = 2, max_deviation_mm = 2;
 };
 
 struct Result {

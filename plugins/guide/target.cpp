@@ -1,11 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // The pose of a robot's target with beads, from one image of a calibrated C-arm.
-#include <cmath>
 #include <marrow/plugin.hpp>
 #include <opencv2/calib3d.hpp>
 
-#include "marrow/base/number_text.hpp"
-#include "marrow/toolbox/calibration/correspondence.hpp"
+#include "marrow/toolbox/calibration/board.hpp"
 
 namespace {
 

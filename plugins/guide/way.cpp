@@ -1,14 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <marrow/plugin.hpp>
 
-#include "marrow/toolbox/geometry/start_axes.hpp"
+#include "marrow/toolbox/geometry/fragments.hpp"
 #include "marrow/toolbox/track/track_state.hpp"
 
 namespace {
 
 using namespace marrow;
-using track::TrackState;
-using track::Trajectory;
+using track::TrackState, track::Trajectory;
 
 Trajectory way(const List<Pose>& poses, const Mesh* model, const Context& context) {
   Trajectory result;

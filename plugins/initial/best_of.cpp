@@ -1,10 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
-#include <marrow/plugin.hpp>
 
-#include "marrow/base/number_text.hpp"
-#include "marrow/toolbox/geometry/start_axes.hpp"
-#include "marrow/toolbox/search/compared.hpp"
+#include "marrow/toolbox/geometry/fragments.hpp"
 #include "marrow/toolbox/search/search.hpp"
 
 namespace {

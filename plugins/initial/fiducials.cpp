@@ -7,7 +7,6 @@
 #include <cmath>
 #include <marrow/plugin.hpp>
 
-#include "marrow/base/number_text.hpp"
 #include "marrow/toolbox/geometry/rigid_fit.hpp"
 
 namespace {

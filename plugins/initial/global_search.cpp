@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
-#include <marrow/plugin.hpp>
 #include <numeric>
 
 #include "marrow/initial/free_scan.hpp"
 #include "marrow/toolbox/match/inputs.hpp"
-#include "marrow/toolbox/search/compared.hpp"
 #include "marrow/toolbox/search/search.hpp"
 
 namespace {
+
+using namespace marrow;
 
 struct Options {
   double rotation_side_deg = 20;
@@ -27,8 +27,8 @@ struct Options {
 
 /// The search of register.multiresolution, started from poses all over the ranges. The first step of each level is
 /// proportional to its reach.
-marrow::search::SearchOptions search_options(const Options& options) {
-  marrow::search::SearchOptions search;
+search::SearchOptions search_options(const Options& options) {
+  search::SearchOptions search;
   search.scan_poses = options.poses;
   search.scan_side_deg = options.rotation_side_deg;
   search.scan_rotation_deg = options.rotation_axial_deg;
@@ -53,21 +53,20 @@ marrow::search::SearchOptions search_options(const Options& options) {
 
 /// What shows the bone in the images, for a search without a start.
 struct Images {
-  const marrow::OutlineProjector* projector;
-  const marrow::List<marrow::View>* views;
-  const marrow::List<marrow::EdgeMap>* edges;
+  const OutlineProjector* projector;
+  const List<View>* views;
+  const List<EdgeMap>* edges;
 
   bool are_there() const { return projector || views || edges; }
   void check() const {
     if (!projector || !views || !edges)
-      throw marrow::Error(
-          std::string("a search without a start needs projector, views and edges, but nothing is wired to ") +
-          (!projector ? "projector"
-           : !views   ? "views"
-                      : "edges") +
-          "; wire it, or give a start");
-    marrow::match::check_views(*views);
-    marrow::match::check_edges(*views, *edges);
+      throw Error(std::string("a search without a start needs projector, views and edges, but nothing is wired to ") +
+                  (!projector ? "projector"
+                   : !views   ? "views"
+                              : "edges") +
+                  "; wire it, or give a start");
+    match::check_views(*views);
+    match::check_edges(*views, *edges);
   }
 };
 
@@ -76,31 +75,29 @@ struct Neighbourhood {
   Eigen::Vector3d model_middle_mm;
   double reach_mm;
 
-  bool near(const marrow::RigidTransform& a, const marrow::RigidTransform& b) const {
+  bool near(const RigidTransform& a, const RigidTransform& b) const {
     return (a * model_middle_mm - b * model_middle_mm).norm() < reach_mm &&
-           marrow::geodesic_angle_rad(a.rotation, b.rotation) < marrow::radians(8);
+           geodesic_angle_rad(a.rotation, b.rotation) < radians(8);
   }
 };
 
 /// The poses, that of the least cost first.
-std::vector<marrow::RigidTransform> in_order_of(const marrow::Cost& cost,
-                                                const std::vector<marrow::RigidTransform>& poses) {
+std::vector<RigidTransform> in_order_of(const Cost& cost, const std::vector<RigidTransform>& poses) {
   const std::vector<double> values = cost.values(poses);
   std::vector<std::size_t> order(poses.size());
   std::iota(order.begin(), order.end(), std::size_t(0));
   std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return values[a] < values[b]; });
-  std::vector<marrow::RigidTransform> sorted;
+  std::vector<RigidTransform> sorted;
   for (const std::size_t i : order) sorted.push_back(poses[i]);
   return sorted;
 }
 
 /// Poses that are not neighbours, in turns the next one by evidence and by cost. Evidence alone prefers long outlines,
 /// of which half lie on an edge; a mean distance prefers those of which little is in view.
-std::vector<marrow::RigidTransform> finalists_of(const std::vector<marrow::RigidTransform>& poses,
-                                                 const marrow::initial::Evidence& evidence, const marrow::Cost& cost,
-                                                 const Neighbourhood& neighbourhood, std::size_t count) {
-  const std::vector<marrow::RigidTransform> orders[] = {evidence.best(poses, poses.size()), in_order_of(cost, poses)};
-  std::vector<marrow::RigidTransform> chosen;
+std::vector<RigidTransform> finalists_of(const std::vector<RigidTransform>& poses, const initial::Evidence& evidence,
+                                         const Cost& cost, const Neighbourhood& neighbourhood, std::size_t count) {
+  const std::vector<RigidTransform> orders[] = {evidence.best(poses, poses.size()), in_order_of(cost, poses)};
+  std::vector<RigidTransform> chosen;
   for (std::size_t i = 0; i < poses.size(); ++i)
     for (const auto& order : orders) {
       const bool is_new = std::none_of(chosen.begin(), chosen.end(),
@@ -112,30 +109,29 @@ std::vector<marrow::RigidTransform> finalists_of(const std::vector<marrow::Rigid
 
 /// Of the poses with nearly as much evidence as any, that of the least cost. Cost alone prefers those of which little
 /// is in view, or that are so far away that their outline is short.
-marrow::RigidTransform best_of(const std::vector<marrow::RigidTransform>& poses,
-                               const marrow::initial::Evidence& evidence, const marrow::Cost& cost) {
+RigidTransform best_of(const std::vector<RigidTransform>& poses, const initial::Evidence& evidence, const Cost& cost) {
   constexpr double kNearly = 0.9;
-  const std::vector<marrow::RigidTransform> sorted = evidence.best(poses, poses.size());
+  const std::vector<RigidTransform> sorted = evidence.best(poses, poses.size());
   const double most = evidence.of(sorted.front());
-  std::vector<marrow::RigidTransform> good;
-  for (const marrow::RigidTransform& pose : sorted)
+  std::vector<RigidTransform> good;
+  for (const RigidTransform& pose : sorted)
     if (evidence.of(pose) >= std::min(most, kNearly * most)) good.push_back(pose);
   return in_order_of(cost, good).front();
 }
 
 /// The best pose of all orientations at all places that the views show. The best of a scan are moved to more evidence,
 /// then refined by the cost through all levels.
-marrow::RigidTransform anywhere(const marrow::Mesh& model, const Images& images, const marrow::FragmentFrame& frame,
-                                const marrow::search::Levels& levels, const Options& options,
-                                marrow::search::Search& search, marrow::Context& context) {
+RigidTransform anywhere(const Mesh& model, const Images& images, const FragmentFrame& frame,
+                        const search::Levels& levels, const Options& options, search::Search& search,
+                        Context& context) {
   constexpr std::size_t kScanned = 16;  // poses of the scan for each candidate; the scan orders poses only roughly
   images.check();
-  const marrow::initial::Seen seen{model, *images.projector, *images.views, *images.edges};
+  const initial::Seen seen{model, *images.projector, *images.views, *images.edges};
   const auto candidates = std::size_t(options.candidates);
   const auto [scanned, middle_mm, cell_mm] =
-      marrow::initial::free_scan(seen, frame, options.poses, kScanned * candidates, context);
-  const marrow::initial::Evidence coarse(seen, middle_mm, cell_mm);
-  std::vector<marrow::RigidTransform> poses = scanned;
+      initial::free_scan(seen, frame, options.poses, kScanned * candidates, context);
+  const initial::Evidence coarse(seen, middle_mm, cell_mm);
+  std::vector<RigidTransform> poses = scanned;
   double step = 1;
   for (const std::size_t kept : {4 * candidates, 2 * candidates, candidates}) {
     coarse.climb(poses, frame.origin_mm, 8 * step, 2 * cell_mm * step);
@@ -145,9 +141,9 @@ marrow::RigidTransform anywhere(const marrow::Mesh& model, const Images& images,
   double done = 0;
   const auto refine = [&](std::size_t level, double share_of_all) {
     const double share = share_of_all / double(poses.size());
-    for (marrow::RigidTransform& pose : poses) {
+    for (RigidTransform& pose : poses) {
       search.go_to(pose);
-      search.refine(*levels[level], marrow::search::kAllAxes, search.steps_of(level), done, share);
+      search.refine(*levels[level], search::kAllAxes, search.steps_of(level), done, share);
       pose = search.pose();
       done += share;
     }
@@ -159,26 +155,25 @@ marrow::RigidTransform anywhere(const marrow::Mesh& model, const Images& images,
   return best_of(poses, coarse, *levels.back());
 }
 
-marrow::Pose global_search(const marrow::Mesh& model, const marrow::Cost& cost, const marrow::Optimizer& optimizer,
-                           const marrow::Pose* start, const marrow::OutlineProjector* projector,
-                           const marrow::List<marrow::View>* views, const marrow::List<marrow::EdgeMap>* edges,
-                           const Options& options, marrow::Context& context) {
+Pose global_search(const Mesh& model, const Cost& cost, const Optimizer& optimizer, const Pose* start,
+                   const OutlineProjector* projector, const List<View>* views, const List<EdgeMap>* edges,
+                   const Options& options, Context& context) {
   if (options.poses == 0)
-    throw marrow::Error("it has no poses to try; give their number, such as 4000, and the ranges to search");
+    throw Error("it has no poses to try; give their number, such as 4000, and the ranges to search");
   if (!start && options.needs_start)
-    throw marrow::Error(
+    throw Error(
         "there is no start to search around; give the approximate placement of the fragment, in case.yaml under "
         "'start' (docs/case.md)");
-  marrow::check_mesh(model, "model");
-  const marrow::search::SearchOptions settings = search_options(options);
-  marrow::search::check_options(settings);
+  check_mesh(model, "model");
+  const search::SearchOptions settings = search_options(options);
+  search::check_options(settings);
   const Images images{projector, views, edges};
-  marrow::Pose middle;
-  middle.world_from_model = start ? start->world_from_model : marrow::RigidTransform{"world", model.frame};
-  marrow::check_pose(middle, "start");
-  middle.frame = marrow::fragment_frame(model);
-  const marrow::search::Levels levels = levels_of(cost, settings);
-  marrow::search::Search search(optimizer, middle, settings, context);
+  Pose middle;
+  middle.world_from_model = start ? start->world_from_model : RigidTransform{"world", model.frame};
+  check_pose(middle, "start");
+  middle.frame = fragment_frame(model);
+  const search::Levels levels = levels_of(cost, settings);
+  search::Search search(optimizer, middle, settings, context);
   if (!start && images.are_there()) {
     search.go_to(anywhere(model, images, middle.frame, levels, options, search, context));
   } else {
@@ -187,7 +182,7 @@ marrow::Pose global_search(const marrow::Mesh& model, const marrow::Cost& cost, 
           "there is no start, so the search is around the place at which CT coordinates are world coordinates");
     search.go_to(search.find(levels).pose);
   }
-  marrow::search::check_compared(*levels.back(), search.pose(), middle.frame);
+  search::check_compared(*levels.back(), search.pose(), middle.frame);
   return pose_of(search, middle, *levels.back());
 }
 
@@ -197,49 +192,44 @@ MARROW_PLUGIN(plugin) {
   plugin.node("initial.global_search", global_search)
       .summary(
           "The pose of least cost within wide ranges, or in any orientation anywhere in view, searched from many poses "
-          "at "
-          "once; no start is needed")
+          "at once; no start is needed")
       .in("model", "surface of the fragment")
       .in("cost", "cost of a pose")
       .in("optimizer", "minimiser that refines the best poses")
       .in("start",
-          "middle of the ranges; none: any orientation is searched, anywhere that all views show; without "
-          "projector, views and edges: CT coordinates are taken as world coordinates")
+          "middle of the ranges; none: any orientation is searched, anywhere that all views show; without projector, "
+          "views and edges: CT coordinates are taken as world coordinates")
       .in("projector", "outline of the model, for a search without a start")
-      .in("views", "X-ray views, for the same", marrow::over("view"))
-      .in("edges", "edge pixels of each view, for the same", marrow::over("view"))
+      .in("views", "X-ray views, for the same", over("view"))
+      .in("edges", "edge pixels of each view, for the same", over("view"))
       .out("pose", "pose of least cost")
       .option("rotation_side_deg", &Options::rotation_side_deg,
-              "range of the rotations about the frontal and lateral axes, to either side", marrow::at_least(0),
-              marrow::at_most(180))
+              "range of the rotations about the frontal and lateral axes, to either side", at_least(0), at_most(180))
       .option("rotation_axial_deg", &Options::rotation_axial_deg,
-              "range of the rotation about the long axis, to either side", marrow::at_least(0), marrow::at_most(180))
+              "range of the rotation about the long axis, to either side", at_least(0), at_most(180))
       .option("translation_side_mm", &Options::translation_side_mm,
-              "range of the shifts along the frontal and lateral axes, to either side", marrow::at_least(0))
+              "range of the shifts along the frontal and lateral axes, to either side", at_least(0))
       .option("translation_axial_mm", &Options::translation_axial_mm,
-              "range of the shift along the long axis, to either side", marrow::at_least(0))
-      .option(
-          "poses", &Options::poses,
-          "number of poses to try, spread evenly over these ranges; without a start, of orientations to try, spread "
-          "evenly over all; 0: the node fails, for pipelines with other ways to a start",
-          marrow::at_least(0))
+              "range of the shift along the long axis, to either side", at_least(0))
+      .option("poses", &Options::poses,
+              "number of poses to try, spread evenly over these ranges; without a start, of orientations to try, "
+              "spread evenly over all; 0: the node fails, for pipelines with other ways to a start",
+              at_least(0))
       .option("candidates", &Options::candidates, "number of best poses to refine; no two of them are neighbours",
-              marrow::at_least(1))
+              at_least(1))
       .option("finalists", &Options::finalists,
               "number of best candidates after the first level that go through all levels; the last level chooses",
-              marrow::at_least(1))
+              at_least(1))
       .option("contour_spacing_px", &Options::contour_spacing_px,
-              "per level: distance between two points of the outline",
-              marrow::replaces({"contour_spacing_px", "ray_step"}))
+              "per level: distance between two points of the outline", replaces({"contour_spacing_px", "ray_step"}))
       .option("reach_px", &Options::reach_px,
               "per level: a point with no edge within this distance counts as unmatched",
-              marrow::replaces({"reach_px", "reach_mm"}))
-      .relation(marrow::same_length({"contour_spacing_px", "reach_px"}))
+              replaces({"reach_px", "reach_mm"}))
+      .relation(same_length({"contour_spacing_px", "reach_px"}))
       .option("pixel_step", &Options::pixel_step,
-              "per level, for costs of grey values: only every n-th pixel is compared",
-              marrow::replaces({"pixel_step"}))
-      .relation(marrow::as_many_or_none("pixel_step", "contour_spacing_px"))
+              "per level, for costs of grey values: only every n-th pixel is compared", replaces({"pixel_step"}))
+      .relation(as_many_or_none("pixel_step", "contour_spacing_px"))
       .option("max_evaluations", &Options::max_evaluations,
-              "largest number of evaluations of the cost for each search of a level", marrow::at_least(1))
+              "largest number of evaluations of the cost for each search of a level", at_least(1))
       .option("needs_start", &Options::needs_start, "fail if there is no start, for pipelines with other ways to one");
 }

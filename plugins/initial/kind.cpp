@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <marrow/plugin.hpp>
 
-#include "suite.hpp"
-
 MARROW_PLUGIN(plugin) {
   plugin.kind("initial")
       .summary("pose to start from")
@@ -18,6 +16,5 @@ MARROW_PLUGIN(plugin) {
       .in<marrow::Pose>("fourth", "a start to choose from")
       .in<marrow::Cost>("cost", "cost of a pose")
       .in<marrow::Optimizer>("optimizer", "minimiser of the cost")
-      .out<marrow::Pose>("pose", "pose to start from, with the fragment's axes")
-      .suite(marrow::conformance::initial_suite());
+      .out<marrow::Pose>("pose", "pose to start from, with the fragment's axes");
 }

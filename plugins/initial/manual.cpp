@@ -3,6 +3,8 @@
 #include <cmath>
 #include <marrow/plugin.hpp>
 
+#include "marrow/toolbox/geometry/targets.hpp"
+
 namespace {
 
 struct Options {
@@ -12,22 +14,14 @@ struct Options {
   bool needs_start = false;
 };
 
-/// Mean distance by which the points of the surface move.
-double mean_distance_mm(const marrow::RigidTransform& from, const marrow::RigidTransform& to,
-                        const std::vector<Eigen::Vector3d>& points_mm) {
-  double sum = 0;
-  for (const Eigen::Vector3d& point : points_mm) sum += (to * point - from * point).norm();
-  return sum / double(points_mm.size());
-}
-
 /// Scales a motion so that it moves the surface by `distance_mm` on average. It uses bisection, because the distance
 /// grows with the motion up to half a turn.
 marrow::Vector6d scaled(const marrow::Vector6d& motion, const marrow::Pose& pose, const marrow::Mesh& model,
                         double distance_mm) {
   const std::vector<Eigen::Vector3d> points_mm = marrow::sample_surface(model, 500);
   const auto distance_at = [&](double scale) {
-    return mean_distance_mm(pose.world_from_model, marrow::moved(pose.world_from_model, pose.frame, scale * motion),
-                            points_mm);
+    return marrow::geometry::mean(marrow::geometry::target_errors_mm(
+        marrow::moved(pose.world_from_model, pose.frame, scale * motion), pose.world_from_model, points_mm));
   };
   double low = 0, high = motion.head<3>().norm() > 0 ? marrow::kPi / motion.head<3>().norm()
                                                      : 2 * distance_mm / motion.tail<3>().norm();

@@ -12,9 +12,7 @@
 #include <cmath>
 #include <marrow/plugin.hpp>
 
-#include "marrow/base/number_text.hpp"
 #include "marrow/initial/axis.hpp"
-#include "marrow/initial/model_borders.hpp"
 
 namespace {
 

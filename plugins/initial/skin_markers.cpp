@@ -10,7 +10,6 @@
 #include <marrow/plugin.hpp>
 #include <set>
 
-#include "marrow/base/number_text.hpp"
 #include "marrow/toolbox/geometry/rigid_fit.hpp"
 
 namespace {

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <marrow/plugin.hpp>
 
-#include "suite.hpp"
-
 MARROW_PLUGIN(plugin) {
   plugin.kind("landmarks")
       .summary("finds named points of a fragment in X-ray views")
@@ -11,6 +9,5 @@ MARROW_PLUGIN(plugin) {
       .in<marrow::RadiographProjector>("projector", "makes radiographs of the fragment")
       .in<marrow::Pose>("start", "about where the fragment is")
       .out<marrow::Landmarks>("landmarks", "the same points, and where the views show them")
-      .runs_apart(marrow::Apart::computes)
-      .suite(marrow::conformance::landmarks_suite());
+      .runs_apart(marrow::Apart::computes);
 }

@@ -1,18 +1,158 @@
 // SPDX-License-Identifier: Apache-2.0
 // Checks for nodes that find named points in views, on a bone whose points are exactly known.
-#include "suite.hpp"
-
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <marrow/plugin.hpp>
 #include <set>
+#include <string>
+#include <vector>
 
-#include "marrow/domain/camera.hpp"
-#include "marrow/runtime/node/types.hpp"
-#include "scene.hpp"
-#include "written_network.hpp"
+#include "marrow/domain/random.hpp"
+#include "marrow/toolbox/analytic/body.hpp"
 
 namespace marrow::conformance {
 namespace {
+
+// A bone that is known analytically, two X-ray views of it, and named points whose pixels are exactly known.
+
+/// A pose of the bone, drawn by its number. is_turned: the world has other axes and another origin.
+struct LandmarkScene {
+  int seed = 1;
+  bool is_turned = false;
+};
+
+using namespace analytic;
+
+constexpr int kSize_px = 240;
+constexpr double kPixel_mm = 0.8;
+
+/// A shaft and two condyles of different size.
+Body bone() { return {{{0, 0, 60}, {13, 12, 90}}, {{24, -5, -38}, {11, 15, 13}}, {{-22, 8, -32}, {13, 11, 15}}}; }
+
+/// A vector of random direction that is between half as long and as long as `most`.
+Eigen::Vector3d drawn(Random& random, double most) {
+  const Eigen::Vector3d direction(random.normal(), random.normal(), random.normal());
+  return direction.normalized() * most * (0.5 + 0.5 * random.uniform());
+}
+
+RigidTransform turn_of_world(const LandmarkScene& scene) {
+  RigidTransform turn{"world", "world"};
+  if (!scene.is_turned) return turn;
+  turn.rotation = rotation_from_vector({1.1, -0.7, 2.0});
+  turn.translation_mm = {130, -40, 75};
+  return turn;
+}
+
+RigidTransform truth(const LandmarkScene& scene) {
+  Random random(std::uint64_t(scene.seed));
+  const Eigen::Vector3d turn_rad = drawn(random, 0.2), shift_mm = drawn(random, 10);
+  return turn_of_world(scene) * moved_by(turn_rad, shift_mm);
+}
+
+Landmarks points() {
+  Landmarks landmarks;
+  landmarks.points = {{"lateral", {35, -5, -38}}, {"medial", {-35, 8, -32}}, {"front", {24, -20, -38}},
+                      {"back", {-22, 19, -32}},   {"end", {-22, 8, -47}},    {"low", {24, -5, -51}}};
+  return landmarks;
+}
+
+View view_of(const LandmarkScene& scene, const std::string& name, double angle_deg, bool shows_bone, Random& random) {
+  constexpr double kBright = 50000, kPerMm = 0.02, kNoise = 250;
+  View view;
+  view.name = name;
+  view.camera = c_arm(angle_deg, kSize_px, kSize_px, kPixel_mm);
+  view.camera.camera_from_world = view.camera.camera_from_world * inverse(turn_of_world(scene));
+  const std::vector<float> chords =
+      BodyProjector(bone()).radiograph(view.camera, truth(scene), PixelGrid{0, 0, 1, kSize_px, kSize_px});
+  view.image.pixels.create(kSize_px, kSize_px, CV_16U);
+  for (int i = 0; i < kSize_px * kSize_px; ++i) {
+    const double tissue_mm = 40 + 30 * std::sin(0.02 * (i % kSize_px)) * std::cos(0.017 * (i / kSize_px));
+    const double chord_mm = shows_bone ? chords[std::size_t(i)] : 0;
+    view.image.pixels.ptr<std::uint16_t>()[i] =
+        std::uint16_t(kBright * std::exp(-kPerMm * (chord_mm + 0.4 * tissue_mm)) + kNoise * random.normal() + 2000);
+  }
+  return view;
+}
+
+Inputs made(const LandmarkScene& scene, bool shows_bone) {
+  Random random(std::uint64_t(200 + scene.seed));
+  List<View> views;
+  for (const auto& [name, angle_deg] : {std::pair("frontal", 0.0), std::pair("lateral", 80.0)})
+    views.add(name, view_of(scene, name, angle_deg, shows_bone, random));
+  Vector6d off;
+  off << drawn(random, 6) * radians(1), drawn(random, 6);
+  Pose start;
+  start.world_from_model = moved(truth(scene), FragmentFrame(), off);
+  return {{"points", item(points())},
+          {"views", Value::of(views, "view")},
+          {"projector", Value::of<RadiographProjector>(std::make_shared<const BodyProjector>(bone()))},
+          {"start", item(start)}};
+}
+
+/// What nodes of the kind take. The start is 3 to 6 degrees and mm off the truth. The views have noise.
+Inputs inputs_of(const LandmarkScene& scene) { return made(scene, true); }
+/// The same without the bone in the views.
+Inputs without_bone(const LandmarkScene& scene) { return made(scene, false); }
+
+// A network of one convolution of 1 x 1 pixels as an ONNX file. Field numbers are those of onnx.proto.
+
+constexpr int kSide_px = 64;
+
+std::string varint(std::uint64_t number) {
+  std::string bytes;
+  for (; number > 127; number >>= 7) bytes += char((number & 127) | 128);
+  return bytes + char(number);
+}
+std::string whole(int field, std::uint64_t value) { return varint(std::uint64_t(field) << 3) + varint(value); }
+std::string part(int field, const std::string& bytes) {
+  return varint(std::uint64_t(field) << 3 | 2) + varint(bytes.size()) + bytes;
+}
+
+std::string tensor(const std::string& name, const std::vector<int>& sides, const std::vector<float>& values) {
+  std::string bytes, raw(values.size() * sizeof(float), '\0');
+  for (const int side : sides) bytes += whole(1, std::uint64_t(side));
+  std::memcpy(raw.data(), values.data(), raw.size());
+  return bytes + whole(2, 1) + part(8, name) + part(9, raw);
+}
+
+std::string shape(const std::string& name, int channels) {
+  std::string dimensions;
+  for (const int side : {1, channels, kSide_px, kSide_px}) dimensions += part(1, whole(1, std::uint64_t(side)));
+  return part(1, name) + part(2, part(1, whole(1, 1) + part(2, dimensions)));
+}
+
+std::string model(int channels) {
+  const std::string sides = part(1, "kernel_shape") + whole(8, 1) + whole(8, 1) + whole(20, 7);
+  const std::string layer = part(1, "image") + part(1, "weights") + part(1, "bias") + part(2, "points") +
+                            part(3, "layer") + part(4, "Conv") + part(5, sides);
+  const std::string graph =
+      part(1, layer) + part(2, "network") +
+      part(5, tensor("weights", {channels, 1, 1, 1}, std::vector<float>(std::size_t(channels), 1))) +
+      part(5, tensor("bias", {channels}, std::vector<float>(std::size_t(channels), 0))) + part(11, shape("image", 1)) +
+      part(12, shape("points", channels));
+  return whole(1, 6) + part(7, graph) + part(8, part(1, "") + whole(2, 11));
+}
+
+/// Writes a network into the folder, and returns its description: each point's heat map is the bone's brightness
+/// itself. It finds nothing well, but a node that runs networks can be called with it.
+std::filesystem::path written_network(const std::filesystem::path& folder, const std::vector<std::string>& names) {
+  std::ofstream(folder / "network.onnx", std::ios::binary) << model(int(names.size()));
+  const std::filesystem::path description = folder / "network.yaml";
+  std::ofstream text(description);
+  text << "marrow-network: 1\nname: bright\nhelp: for checks\nversion: 1.0.0\nlicence: Apache-2.0\n"
+          "trained: {data: nothing, good_for: checks, not_for: anything else}\n"
+          "input:\n  values: line_integrals\n  bone: bright\n  pixel_px: 2\n"
+          "  normalise: {method: percentiles, low: 1, high: 99}\n"
+       << "  size_px: [" << kSide_px << ", " << kSide_px << "]\n  overlap_px: 16\n"
+       << "outputs:\n  heat_maps:\n    layer: points\n    names: [";
+  for (std::size_t i = 0; i < names.size(); ++i) text << (i ? ", " : "") << names[i];
+  text << "]\n    activation: none\n";
+  return description;
+}
 
 constexpr int kCases = 4;
 
@@ -178,8 +318,6 @@ std::vector<Trial> trials() {
                              [](Pose& start) { start.world_from_model.translation_mm.y() += 5000; })};
 }
 
-}  // namespace
-
 Suite landmarks_suite() {
   Suite suite{[] { return inputs_of({}); }, validate, trials(), {}};
   suite.options = [] {
@@ -205,4 +343,7 @@ Suite landmarks_suite() {
   return suite;
 }
 
+}  // namespace
 }  // namespace marrow::conformance
+
+MARROW_PLUGIN(plugin) { plugin.suite("landmarks", marrow::conformance::landmarks_suite()); }

@@ -9,8 +9,7 @@
 #include <opencv2/imgproc.hpp>
 #include <optional>
 
-#include "marrow/base/number_text.hpp"
-#include "marrow/toolbox/image/line_integrals.hpp"
+#include "marrow/toolbox/image/grey_values.hpp"
 
 namespace {
 

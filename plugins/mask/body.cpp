@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 // A body whose pose is known, such as an implant, hides what is searched for next. Its pixels are left out.
-#include <marrow/plugin.hpp>
 
 #include "marrow/mask/leave_out.hpp"
 

@@ -2,16 +2,11 @@
 // Metal attenuates far more than what surrounds it, so a threshold on the line integral above that of the surroundings
 // finds it. A second, lower threshold follows it to its border (hysteresis, as in Canny's detector, IEEE TPAMI 1986).
 // The field of a round collimator is found by its outline, as for edges.
-#include <algorithm>
-#include <cmath>
-#include <marrow/plugin.hpp>
-#include <opencv2/imgproc.hpp>
 
 #include "marrow/base/names.hpp"
 #include "marrow/mask/leave_out.hpp"
 #include "marrow/toolbox/image/field_of_view.hpp"
-#include "marrow/toolbox/image/grey_range.hpp"
-#include "marrow/toolbox/image/line_integrals.hpp"
+#include "marrow/toolbox/image/grey_values.hpp"
 
 namespace {
 
@@ -70,8 +65,7 @@ cv::Mat grey_of(const View& view) {
   const image::GreyRange range = image::grey_range(grey);
   if (range.least == range.greatest)
     throw Error("view '" + view.name +
-                "': all pixels have the same value, so there is nothing to find; check the "
-                "image file");
+                "': all pixels have the same value, so there is nothing to find; check the image file");
   return grey;
 }
 

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // A trained network says what each pixel shows. Metal and what lies outside of the detector's field must not count
 // where a bone is compared with the image.
-#include <marrow/plugin.hpp>
 
 #include "marrow/mask/leave_out.hpp"
 #include "marrow/toolbox/network/inference.hpp"

@@ -1,19 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 // Checks for masks on a radiograph of a bone with a rod of metal in front of it, whose places in the image are known
 // exactly. The bone stays, and so do the image, the camera and what was left out before.
-#include "suite.hpp"
-
-#include <algorithm>
-#include <cmath>
+#include <marrow/plugin.hpp>
 #include <random>
 
-#include "marrow/base/number_text.hpp"
-#include "marrow/runtime/node/types.hpp"
 #include "marrow/toolbox/analytic/body.hpp"
 #include "marrow/toolbox/geometry/implant.hpp"
 
-namespace marrow::conformance {
 namespace {
+
+using namespace marrow;
+using namespace marrow::conformance;
 
 constexpr int kWidth = 260, kHeight = 220;
 constexpr double kPixel_mm = 0.6, kAir = 50000, kNoise = 0.01;
@@ -170,15 +167,14 @@ std::vector<Trial> trials() {
            }}};
 }
 
-}  // namespace
-
-Suite mask_suite() {
+Suite suite_of_kind() {
   Suite suite{[] { return inputs_of(before()); }, validate, trials(), {}};
-  suite.accuracy.push_back({{"metal_kept", "part of the rod's pixels that still count", 2, "%"}, metal_kept});
-  suite.accuracy.push_back(
-      {{"bone_lost", "part of the bone's pixels, 8 px or more away from the rod, that are left out", 2, "%"},
-       bone_lost});
+  suite.add("metal_kept", "part of the rod's pixels that still count", 2, "%", metal_kept);
+  suite.add("bone_lost", "part of the bone's pixels, 8 px or more away from the rod, that are left out", 2, "%",
+            bone_lost);
   return suite;
 }
 
-}  // namespace marrow::conformance
+}  // namespace
+
+MARROW_PLUGIN(plugin) { plugin.suite("mask", suite_of_kind()); }

@@ -1,12 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // What stands out by its grey value alone, such as an implant of metal: the silhouette without a network.
-#include <algorithm>
 #include <marrow/plugin.hpp>
 #include <opencv2/imgproc.hpp>
-#include <optional>
-#include <vector>
-
-#include "marrow/base/number_text.hpp"
 
 namespace {
 

@@ -1,18 +1,14 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // This file is under the GPL because it is linked to the surface mesher of CGAL (delaunay_refinement.cpp).
-#include <marrow/domain/mesh.hpp>
 #include <marrow/plugin.hpp>
 
 #include "delaunay_refinement.hpp"
-#include "marrow/base/number_text.hpp"
-#include "marrow/mesh/signs.hpp"
+#include "marrow/mesh/surface.hpp"
 
 namespace {
 
 using Eigen::Vector3d;
-using marrow::Grid;
-using marrow::Mesh;
-using marrow::SignedField;
+using marrow::Grid, marrow::Mesh, marrow::SignedField;
 
 struct Options : marrow::surface::Finish {
   double min_angle_deg = 30, max_radius_mm = 2, max_distance_mm = 0.05;

@@ -11,8 +11,7 @@
 
 namespace {
 
-using marrow::Mesh;
-using marrow::SignedField;
+using marrow::Mesh, marrow::SignedField;
 
 using Options = marrow::surface::Finish;
 

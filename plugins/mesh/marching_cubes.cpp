@@ -4,15 +4,12 @@
 #include <marrow/plugin.hpp>
 
 #include "marrow/mesh/cells.hpp"
-#include "marrow/mesh/signs.hpp"
+#include "marrow/mesh/surface.hpp"
 
 namespace {
 
-using marrow::Grid;
-using marrow::Mesh;
-using marrow::SignedField;
-using marrow::surface::Signs;
-using marrow::surface::Word;
+using marrow::Grid, marrow::Mesh, marrow::SignedField;
+using marrow::surface::Signs, marrow::surface::Word;
 using Options = marrow::surface::Finish;
 
 /// Indices of the first vertices and of the first triangle of a row of cells along x. A row owns the grid edges that

@@ -1,16 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <marrow/domain/mesh.hpp>
 #include <marrow/plugin.hpp>
 
-#include "marrow/mesh/signs.hpp"
+#include "marrow/mesh/surface.hpp"
 #include "poisson_surface.hpp"
 
 namespace {
 
 using Eigen::Vector3d;
-using marrow::Grid;
-using marrow::Mesh;
-using marrow::SignedField;
+using marrow::Grid, marrow::Mesh, marrow::SignedField;
 
 struct Options : marrow::surface::Finish {
   int depth = 0;
@@ -87,8 +84,7 @@ Mesh poisson(const SignedField& field, const Options& options) {
   if (!finite || !marrow::is_manifold(mesh))
     throw marrow::Error(
         "field: the surface that fits its points is not closed, as Poisson reconstruction needs a smooth surface; "
-        "smooth the "
-        "field, or use mesh.marching_cubes, which takes every field");
+        "smooth the field, or use mesh.marching_cubes, which takes every field");
   return mesh;
 }
 

@@ -2,21 +2,16 @@
 // Checks for nodes of the kind mesh, on signed fields of known shape: a sphere, a torus, smooth bodies without
 // symmetry, and fields of noise. Some grids have voxels that are not cubes, or rotated axes. Nodes that change a mesh
 // get the same shapes as meshes.
-#include "suite.hpp"
-
-#include <Eigen/Geometry>
-#include <algorithm>
-#include <cmath>
+#include <marrow/plugin.hpp>
 #include <random>
 #include <set>
 
-#include "marrow/base/number_text.hpp"
-#include "marrow/domain/mesh.hpp"
 #include "marrow/domain/quantile.hpp"
-#include "marrow/runtime/node/types.hpp"
 
-namespace marrow::conformance {
 namespace {
+
+using namespace marrow;
+using namespace marrow::conformance;
 
 using Distance = std::function<double(const Eigen::Vector3d&)>;
 constexpr double kSphereRadius_mm = 17.3, kTorusRadius_mm = 15.2, kTubeRadius_mm = 6.4;
@@ -314,37 +309,33 @@ std::vector<Trial> trials() {
            }}};
 }
 
-}  // namespace
-
-Suite mesh_suite() {
+Suite suite_of_kind() {
   Suite suite{[] { return sphere().inputs; }, validate, trials(), {}};
-  const auto add = [&](const std::string& name, const std::string& what, double limit, const std::string& unit,
-                       std::function<double(const Subject&)> measure) {
-    suite.accuracy.push_back({{name, what, limit, unit}, std::move(measure)});
-  };
   const std::string voxels = " at 0.9 x 0.9 x 1.2 mm";
-  add("random_fields", "fields of noise: the mesh is closed and not pinched, or the node refuses with a reason", 20,
-      "of 20 refused", [](const Subject& subject) { return refused(subject, random_fields()); });
-  add("all_patterns",
-      "all sign patterns of a cell: the mesh is closed and not pinched, or the node refuses with a reason", 512,
-      "of 512 refused", [](const Subject& subject) { return refused(subject, all_patterns()); });
-  add("blobs_distance", "95th percentile of the distance to smooth shapes" + voxels, 0.15, "mm",
-      [](const Subject& subject) { return worst_of_blobs(subject, distance_95); });
-  add("blobs_volume", "error of the volume of smooth shapes" + voxels, 1.5, "%",
-      [](const Subject& subject) { return worst_of_blobs(subject, volume_error); });
+  suite.add("random_fields", "fields of noise: the mesh is closed and not pinched, or the node refuses with a reason",
+            20, "of 20 refused", [](const Subject& subject) { return refused(subject, random_fields()); });
+  suite.add("all_patterns",
+            "all sign patterns of a cell: the mesh is closed and not pinched, or the node refuses with a reason", 512,
+            "of 512 refused", [](const Subject& subject) { return refused(subject, all_patterns()); });
+  suite.add("blobs_distance", "95th percentile of the distance to smooth shapes" + voxels, 0.15, "mm",
+            [](const Subject& subject) { return worst_of_blobs(subject, distance_95); });
+  suite.add("blobs_volume", "error of the volume of smooth shapes" + voxels, 1.5, "%",
+            [](const Subject& subject) { return worst_of_blobs(subject, volume_error); });
   for (const auto& [name, make] : {std::pair<std::string, std::function<Shape()>>{"sphere", [] { return sphere(); }},
                                    {"turned_sphere", [] { return sphere(true); }},
                                    {"torus", torus}}) {
-    add(name + "_topology", "the mesh is closed, oriented, and has the right Euler number", 0, "",
-        [make = make](const Subject& subject) { return topology(subject, make()); });
-    add(name + "_distance", "95th percentile of the distance to the true surface" + voxels, 0.15, "mm",
-        [make = make](const Subject& subject) { return distance_95(subject, make()); });
-    add(name + "_area", "error of the area" + voxels, 1.5, "%",
-        [make = make](const Subject& subject) { return area_error(subject, make()); });
-    add(name + "_volume", "error of the volume" + voxels, 1.5, "%",
-        [make = make](const Subject& subject) { return volume_error(subject, make()); });
+    suite.add(name + "_topology", "the mesh is closed, oriented, and has the right Euler number", 0, "",
+              [make = make](const Subject& subject) { return topology(subject, make()); });
+    suite.add(name + "_distance", "95th percentile of the distance to the true surface" + voxels, 0.15, "mm",
+              [make = make](const Subject& subject) { return distance_95(subject, make()); });
+    suite.add(name + "_area", "error of the area" + voxels, 1.5, "%",
+              [make = make](const Subject& subject) { return area_error(subject, make()); });
+    suite.add(name + "_volume", "error of the volume" + voxels, 1.5, "%",
+              [make = make](const Subject& subject) { return volume_error(subject, make()); });
   }
   return suite;
 }
 
-}  // namespace marrow::conformance
+}  // namespace
+
+MARROW_PLUGIN(plugin) { plugin.suite("mesh", suite_of_kind()); }

@@ -13,13 +13,12 @@
 #include <marrow/plugin.hpp>
 
 #include "marrow/mesh/cells.hpp"
-#include "marrow/mesh/signs.hpp"
+#include "marrow/mesh/surface.hpp"
 
 namespace {
 
 using Eigen::Vector3d;
-using marrow::Mesh;
-using marrow::SignedField;
+using marrow::Mesh, marrow::SignedField;
 using marrow::surface::Signs;
 
 struct Options : marrow::surface::Finish {

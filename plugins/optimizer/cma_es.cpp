@@ -5,7 +5,6 @@
 #include <vector>
 
 #include <marrow/domain/decompositions.hpp>
-#include "marrow/base/number_text.hpp"
 #include "marrow/optimizer/evaluations.hpp"
 
 namespace {

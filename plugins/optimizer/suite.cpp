@@ -2,16 +2,11 @@
 // Checks for optimizers on functions of six variables with a known minimum: a bowl, a long bowl, a bent valley, and a
 // function with many local minima for optimizers that need no start near the minimum. Each runs from ten starts, with
 // 1500 evaluations.
-#include "suite.hpp"
-
 #include <algorithm>
 #include <cmath>
+#include <marrow/plugin.hpp>
 #include <random>
 #include <thread>
-
-#include "marrow/base/error.hpp"
-#include "marrow/base/number_text.hpp"
-#include "marrow/domain/functions.hpp"
 
 namespace marrow::conformance {
 namespace {
@@ -212,12 +207,10 @@ double lost_exceptions(const Subject& subject) {
   try {
     (*optimizer).minimise(problem);
   } catch (const Cancelled&) {
-    return 0;
+    return calls == 5 ? 0 : 1;  // at once
   }
   return 1;
 }
-
-}  // namespace
 
 Suite optimizer_suite() {
   Suite suite{[] { return Inputs{}; }, validate, {}, {}};
@@ -253,4 +246,7 @@ Suite optimizer_suite() {
   return suite;
 }
 
+}  // namespace
 }  // namespace marrow::conformance
+
+MARROW_PLUGIN(plugin) { plugin.suite("optimizer", marrow::conformance::optimizer_suite()); }

@@ -3,8 +3,7 @@
 #include <marrow/plugin.hpp>
 
 #include "marrow/toolbox/geometry/implant.hpp"
-#include "marrow/toolbox/geometry/locking_plan.hpp"
-#include "marrow/toolbox/phantom/loft.hpp"
+#include "marrow/toolbox/phantom/phantom.hpp"
 
 namespace {
 

@@ -1,31 +1,53 @@
 // SPDX-License-Identifier: Apache-2.0
 // Where a drill has to go to lock a nail, from the nail's pose: the axis of each hole with its deviations, the place of
 // the drill guide, and the C-arm's angles at which the hole is seen as a circle.
-#include <Eigen/Geometry>
-#include <algorithm>
-#include <cmath>
 #include <marrow/plugin.hpp>
 
-#include "marrow/base/number_text.hpp"
-#include "marrow/plan/length_quantile.hpp"
+#include "marrow/domain/decompositions.hpp"
 #include "marrow/toolbox/geometry/implant.hpp"
-#include "marrow/toolbox/geometry/locking_plan.hpp"
 
 namespace {
 
 using namespace marrow;
-using Eigen::Matrix3d;
-using Eigen::Vector3d;
-using geometry::Hole;
-using geometry::Implant;
-using geometry::LockingPlan;
+using Eigen::Matrix3d, Eigen::Vector3d;
+using geometry::Hole, geometry::Implant, geometry::LockingPlan;
+
+/// The probability that a vector with these variances along two axes is longer. Scaled by its deviations, the vector
+/// has a uniform direction and a Rayleigh length. So the probability is the mean over the directions of exp(-length^2 /
+/// (2 variance along the direction)). The function is smooth and periodic, so few points give all digits.
+double longer_than(double length, double large, double small) {
+  constexpr int kDirections = 128;  // of a quarter turn; the others are alike
+  double sum = 0;
+  for (int i = 0; i < kDirections; ++i) {
+    const double angle = 0.5 * kPi * (i + 0.5) / kDirections, cosine = std::cos(angle);
+    const double variance = small + (large - small) * cosine * cosine;
+    sum += std::exp(-0.5 * length * length / variance);
+  }
+  return sum / kDirections;
+}
+
+/// The length that a vector in a plane does not exceed with this probability (above 0, below 1), if it is normally
+/// distributed around zero. `covariance` is that of the plane's vectors in space, so its least eigenvalue is 0. The
+/// result is exact for any ratio of the other two: 1.96 deviations along a line, 2.45 in a circle. It is NaN or
+/// infinite if a variance is.
+double length_quantile(const Matrix3d& covariance, double probability) {
+  if (!covariance.allFinite()) return std::sqrt(covariance.trace());
+  const Eigen::Vector3d variances = eigen_of_symmetric<3>(covariance).values;
+  const double large = variances[2], small = std::max(0.0, variances[1]);
+  if (!(large > 0)) return 0;
+  double low = 0, high = std::sqrt(-2 * large * std::log(1 - probability));  // as if it were a circle
+  for (int step = 0; step < 60; ++step) {
+    const double middle = 0.5 * (low + high);
+    (longer_than(middle, large, small) > 1 - probability ? low : high) = middle;
+  }
+  return high;
+}
 
 struct LockingOptions {
   std::string side = "unknown";
   std::vector<double> from;
   double guide_mm = 100;
-  double max_angle_deg = 1;
-  double max_offset_mm = 0.5;
+  double max_angle_deg = 1, max_offset_mm = 0.5;
   double max_cost = 0.35;
   Vector3d isocentre_mm = Vector3d::Zero();
   double source_to_isocentre_mm = 600;
@@ -52,8 +74,8 @@ void predict(const Pose& pose, const Hole& hole, LockingPlan::Drill& drill) {
                  of_shift = shift * *pose.covariance * shift.transpose();
   drill.deviation_deg = degrees(std::sqrt(std::max(0.0, of_turn.trace())));
   drill.deviation_mm = std::sqrt(std::max(0.0, of_shift.trace()));
-  drill.most_deg = degrees(plan::length_quantile(of_turn, kMost));
-  drill.most_mm = plan::length_quantile(of_shift, kMost);
+  drill.most_deg = degrees(length_quantile(of_turn, kMost));
+  drill.most_mm = length_quantile(of_shift, kMost);
 }
 
 /// The C-arm turned so that the ray through the hole's centre runs along its axis. With the viewing direction w, the

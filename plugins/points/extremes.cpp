@@ -6,7 +6,6 @@
 #include <marrow/plugin.hpp>
 
 #include "marrow/base/names.hpp"
-#include "marrow/base/number_text.hpp"
 
 namespace {
 
@@ -127,10 +126,9 @@ MARROW_PLUGIN(plugin) {
               "whose axes the directions are in. fragment: its long axis is up, and back is the CT's, across it; ct: "
               "those of the CT, for a bone that is not long",
               one_of({"fragment", "ct"}))
-      .option(
-          "level", &Options::level,
-          "two of the names: the axes are turned about the one that is up until these points lie beside each other; "
-          "none: they are not turned")
+      .option("level", &Options::level,
+              "two of the names: the axes are turned about the one that is up until these points lie beside each "
+              "other; none: they are not turned")
       .option("cap_mm", &Options::cap_mm, "height of the cap at the extreme whose middle is the point", at_least(0.1),
               at_most(50));
 }

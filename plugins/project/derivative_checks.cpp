@@ -1,13 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "derivative_checks.hpp"
-
-#include <algorithm>
-#include <cmath>
-
-#include "bodies.hpp"
-#include "made.hpp"
+#include "checks.hpp"
 #include "marrow/base/number_text.hpp"
-#include "marrow/domain/functions.hpp"
 #include "marrow/domain/quantile.hpp"
 #include "marrow/domain/random.hpp"
 
@@ -172,13 +165,12 @@ Check check_of(const char* name, const char* what, double limit, const char* uni
 }  // namespace
 
 std::vector<Check> derivative_checks() {
-  return {
-      check_of("slopes",
-               "derivatives of radiographs against differences at 200 poses: root mean square over the pixels, as a "
-               "part of the largest derivative",
-               3e-3, "1", slopes_of_smooth_off),
-      check_of("values_with_slopes", "a radiograph with derivatives against one without: largest difference", 1e-3,
-               "mm of water", values_off_mm)};
+  return {check_of("slopes",
+                   "derivatives of radiographs against differences at 200 poses: root mean square over the pixels, as "
+                   "a part of the largest derivative",
+                   3e-3, "1", slopes_of_smooth_off),
+          check_of("values_with_slopes", "a radiograph with derivatives against one without: largest difference", 1e-3,
+                   "mm of water", values_off_mm)};
 }
 
 }  // namespace marrow::conformance

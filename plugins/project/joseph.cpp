@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <marrow/plugin.hpp>
-
-#include "marrow/project/joseph_projector.hpp"
+#include "marrow/project/slices.hpp"
 
 namespace {
 

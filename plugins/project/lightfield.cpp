@@ -4,18 +4,11 @@
 // Rohlfing et al. (IEEE Trans Med Imaging 24(11), 2005, attenuation fields) after Levoy and Hanrahan (SIGGRAPH 1996).
 #include <tbb/parallel_for.h>
 
-#include <cmath>
-#include <marrow/plugin.hpp>
-
-#include "marrow/base/number_text.hpp"
-#include "marrow/project/bricks.hpp"
 #include "marrow/project/rays.hpp"
 
 namespace {
 
-using marrow::rays::Attenuation;
-using marrow::rays::Bricks;
-using marrow::rays::Rays;
+using marrow::rays::Attenuation, marrow::rays::Bricks, marrow::rays::Rays;
 
 struct Options : marrow::rays::AttenuationOptions {
   double max_rotation_deg = 8;

@@ -1,11 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "outline_checks.hpp"
-
-#include <algorithm>
-#include <cmath>
-
-#include "bodies.hpp"
-#include "made.hpp"
+#include "checks.hpp"
 
 namespace marrow::conformance {
 namespace {

@@ -1,12 +1,79 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "radiograph_checks.hpp"
-
-#include <algorithm>
-#include <cmath>
-
-#include "made.hpp"
+#include "checks.hpp"
 #include "marrow/base/number_text.hpp"
-#include "marrow/project/plane_solid.hpp"
+
+namespace marrow::analytic {
+namespace {
+
+/// A solid between pairs of parallel planes around the origin, |normal_k . x| <= 1, such as a box: unit normals, each
+/// divided by its plane's distance from the origin.
+using PlaneSolid = std::vector<Eigen::Vector3d>;
+
+/// Length in mm of the part of a ray that is inside the solid and in front of its start. `direction`: a unit vector.
+double chord_mm(const PlaneSolid& solid, const Eigen::Vector3d& start, const Eigen::Vector3d& direction) {
+  double from = 0, to = 1e9;
+  for (const Eigen::Vector3d& n : solid) {
+    const double s = n.dot(start), d = n.dot(direction);
+    if (std::abs(d) < 1e-12) {
+      if (std::abs(s) > 1) return 0;
+      continue;
+    }
+    const double a = (-1 - s) / d, b = (1 - s) / d;
+    from = std::max(from, std::min(a, b));
+    to = std::min(to, std::max(a, b));
+  }
+  return std::max(0.0, to - from);
+}
+
+PlaneSolid box_between(const Eigen::Vector3d& half) {
+  return {Eigen::Vector3d::UnitX() / half.x(), Eigen::Vector3d::UnitY() / half.y(),
+          Eigen::Vector3d::UnitZ() / half.z()};
+}
+
+PlaneSolid octahedron_between(const Eigen::Vector3d& half) {
+  PlaneSolid normals;
+  for (int k = 0; k < 4; ++k) normals.push_back(Eigen::Vector3d(1, k & 1 ? -1 : 1, k & 2 ? -1 : 1).cwiseQuotient(half));
+  return normals;
+}
+
+/// `hu` inside and -1000 outside. A voxel at the surface is a mix, by the part of it that lies inside.
+Volume volume_of(const PlaneSolid& solid, const Grid& grid, double hu) {
+  constexpr int kParts = 4;  // a voxel is divided into this many parts along each axis
+  Volume volume{grid, {}};
+  for (int z = 0; z < grid.size[2]; ++z)
+    for (int y = 0; y < grid.size[1]; ++y)
+      for (int x = 0; x < grid.size[0]; ++x) {
+        int inside = 0;
+        for (int i = 0; i < kParts * kParts * kParts; ++i) {
+          const int v = i / kParts % kParts, w = i / kParts / kParts;
+          const Eigen::Vector3d part(i % kParts, v, w);
+          const Eigen::Vector3d p = grid.point_from_index(
+              Eigen::Vector3d(x, y, z) + (part + Eigen::Vector3d::Constant(0.5 - 0.5 * kParts)) / kParts);
+          inside += std::all_of(solid.begin(), solid.end(),
+                                [&](const Eigen::Vector3d& n) { return std::abs(n.dot(p)) <= 1; });
+        }
+        volume.values.push_back(float(-1000 + (hu + 1000) * inside / (kParts * kParts * kParts)));
+      }
+  return volume;
+}
+
+/// Negative inside. Inside and in front of a face it is the distance to the surface. In front of an edge or a corner it
+/// is smaller.
+SignedField field_of(const PlaneSolid& solid, const Grid& grid) {
+  SignedField field{grid, {}};
+  for (int z = 0; z < grid.size[2]; ++z)
+    for (int y = 0; y < grid.size[1]; ++y)
+      for (int x = 0; x < grid.size[0]; ++x) {
+        double distance = -1e9;
+        const Eigen::Vector3d p = grid.point_from_index({double(x), double(y), double(z)});
+        for (const Eigen::Vector3d& n : solid) distance = std::max(distance, (std::abs(n.dot(p)) - 1) / n.norm());
+        field.values_mm.push_back(float(distance));
+      }
+  return field;
+}
+
+}  // namespace
+}  // namespace marrow::analytic
 
 namespace marrow::conformance {
 namespace {
@@ -196,6 +263,42 @@ std::vector<Check> radiograph_checks() {
           check_of("source_within", "largest error if the source lies within the body", 2.5, ball, source_within_mm),
           {{"other_fragment", "value at a pixel that shows only another fragment", 0, "mm of water"},
            [](const Subject& subject) { return other_fragment_mm(subject); }}};
+}
+
+Camera camera_at(double angle_deg) { return analytic::c_arm(angle_deg, kSize_px, kSize_px, 1); }
+const std::vector<double>& angles() {
+  static const std::vector<double> kAngles{0, 35, 90, 160};
+  return kAngles;
+}
+RigidTransform pose() { return analytic::moved_by({0.3, -0.2, 0.5}, {3, -4, 6}); }
+
+analytic::Body ball() { return {{{0, 0, 0}, {18, 18, 18}}}; }
+analytic::Body egg() { return {{{1, -2, 1.5}, {11, 16, 27}, rotation_from_vector({0.4, 0.2, -0.3})}}; }
+Grid fine_grid() { return analytic::grid_of({62, 62, 78}, {0.8, 0.8, 0.8}); }
+
+Inputs inputs_of(Volume volume, SignedField field, Mesh mesh) {
+  List<View> views;
+  for (const double angle : {0.0, 90.0}) {
+    const std::string name = angle == 0 ? "frontal" : "lateral";
+    views.add(name, View{name, Image{cv::Mat(kSize_px, kSize_px, CV_16U, cv::Scalar(20000))}, camera_at(angle), {}});
+  }
+  return {{"volume", item(std::move(volume))},
+          {"field", item(std::move(field))},
+          {"model", item(std::move(mesh))},
+          {"views", Value::of(views, "view")}};
+}
+Inputs inputs_of(const analytic::Body& body) {
+  Inputs inputs = inputs_of(volume_of(body, fine_grid(), 1000 * kDensity - 1000, -1000), field_of(body, fine_grid(), 6),
+                            mesh_of(body));
+  const auto projector = std::make_shared<const analytic::BodyProjector>(body, kDensity);
+  List<RadiographProjector> projectors;
+  projectors.add_shared("bone", projector);
+  List<Pose> poses;
+  poses.add("bone", Pose());
+  inputs.set("projector", Value::of<RadiographProjector>(projector));
+  inputs.set("other_projectors", Value::of(projectors, "fragment"));
+  inputs.set("others", Value::of(poses, "fragment"));
+  return inputs;
 }
 
 }  // namespace marrow::conformance

@@ -1,15 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <cmath>
-#include <marrow/plugin.hpp>
-
 #include "marrow/project/rays.hpp"
 
 namespace {
 
-using marrow::rays::AttenuationOptions;
-using marrow::rays::RayMotion;
-using marrow::rays::RayProjector;
-using marrow::rays::Span;
+using marrow::rays::AttenuationOptions, marrow::rays::RayMotion, marrow::rays::RayProjector, marrow::rays::Span;
 
 struct Options : AttenuationOptions {
   double sample_spacing_mm = 0.5;

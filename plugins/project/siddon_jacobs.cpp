@@ -1,14 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <cmath>
-#include <marrow/plugin.hpp>
-
 #include "marrow/project/rays.hpp"
 
 namespace {
 
-using marrow::rays::AttenuationOptions;
-using marrow::rays::RayProjector;
-using marrow::rays::Span;
+using marrow::rays::AttenuationOptions, marrow::rays::RayProjector, marrow::rays::Span;
 
 /// Exact for voxels of constant attenuation. A ray is followed from one voxel wall to the next. As in Jacobs et al.,
 /// the next wall is found by additions.

@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <algorithm>
-#include <cmath>
 #include <marrow/plugin.hpp>
 #include <opencv2/imgproc.hpp>
 

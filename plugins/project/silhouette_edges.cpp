@@ -1,12 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <algorithm>
-#include <cmath>
 #include <marrow/plugin.hpp>
 
-#include "marrow/base/dispatch.hpp"
 #include "marrow/project/surface_patches.hpp"
 #include "marrow/project/volume_border.hpp"
-#include "marrow/toolbox/geometry/coarse_surface.hpp"
+#include "marrow/toolbox/geometry/silhouette_image.hpp"
 
 namespace {
 

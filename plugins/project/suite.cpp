@@ -1,23 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 // Checks for projectors. Radiographs are compared with the exact chords of a ball, a box and an octahedron, outlines
 // with the silhouette of an ellipsoid. A node draws one or both, as the types of its outputs say.
-#include "suite.hpp"
-
 #include <oneapi/tbb/global_control.h>
 #include <oneapi/tbb/task_arena.h>
+#include <marrow/plugin.hpp>
 
-#include <algorithm>
-#include <cmath>
+#include "checks.hpp"
 
-#include "bodies.hpp"
-#include "derivative_checks.hpp"
-#include "made.hpp"
-#include "marrow/base/number_text.hpp"
-#include "outline_checks.hpp"
-#include "radiograph_checks.hpp"
-
-namespace marrow::conformance {
 namespace {
+
+using namespace marrow;
+using namespace marrow::conformance;
 
 void validate(const Inputs&, const std::vector<PortInfo>& ports, const std::vector<Value>& outputs) {
   const Camera camera = camera_at(0);
@@ -141,22 +134,20 @@ std::vector<Trial> trials() {
        }}};
 }
 
-}  // namespace
-
-Suite project_suite() {
+Suite suite_of_kind() {
   Suite suite;
   suite.sample = [] { return inputs_of(egg()); };
   suite.validate = validate;
   suite.trials = trials();
   suite.accuracy = radiograph_checks();
-  suite.accuracy.push_back(
-      {{"moved_together", "model and camera moved together: largest change", 0.05, "mm of water"}, moved_together});
-  suite.accuracy.push_back(
-      {{"any_threads", "outlines and radiographs that differ with 1, 2 and 7 threads", 0, "pictures"},
-       differing_drawings});
+  suite.add("moved_together", "model and camera moved together: largest change", 0.05, "mm of water", moved_together);
+  suite.add("any_threads", "outlines and radiographs that differ with 1, 2 and 7 threads", 0, "pictures",
+            differing_drawings);
   for (const Check& check : derivative_checks()) suite.accuracy.push_back(check);
   for (const Check& check : outline_checks()) suite.accuracy.push_back(check);
   return suite;
 }
 
-}  // namespace marrow::conformance
+}  // namespace
+
+MARROW_PLUGIN(plugin) { plugin.suite("project", suite_of_kind()); }

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // A bone's radiograph together with those of its neighbours, so that a cost explains what overlaps the bone instead of
 // leaving it out.
-#include <marrow/plugin.hpp>
 
 #include "marrow/toolbox/match/bones_together.hpp"
 #include "marrow/toolbox/match/inputs.hpp"

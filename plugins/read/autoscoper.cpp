@@ -3,17 +3,13 @@
 #include <marrow/plugin.hpp>
 
 #include "marrow/base/diagnostics.hpp"
-#include "marrow/base/number_text.hpp"
-#include "marrow/read/view_file.hpp"
+#include "marrow/read/camera_file.hpp"
 #include "marrow/toolbox/exchange/autoscoper_trial.hpp"
-#include "marrow/toolbox/files/image_doubts.hpp"
 #include "marrow/toolbox/files/input_file.hpp"
 #include "marrow/toolbox/files/mesh_file.hpp"
 #include "marrow/toolbox/files/sequence_files.hpp"
-#include "marrow/toolbox/files/volume_doubts.hpp"
 #include "marrow/toolbox/files/volume_file.hpp"
 #include "marrow/toolbox/files/yaml_values.hpp"
-#include "marrow/toolbox/track/autoscoper_frame.hpp"
 #include "marrow/toolbox/track/tra_file.hpp"
 
 namespace {

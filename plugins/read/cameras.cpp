@@ -6,7 +6,6 @@
 #include <numeric>
 
 #include "marrow/read/camera_file.hpp"
-#include "marrow/read/projections.hpp"
 
 namespace {
 

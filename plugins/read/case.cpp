@@ -1,32 +1,21 @@
 // SPDX-License-Identifier: Apache-2.0
 // Reads a case: a patient's folder with case.yaml. This file names all other files of the case (docs/case.md).
 #include <map>
-#include <marrow/plugin.hpp>
 
 #include "marrow/base/names.hpp"
-#include "marrow/base/number_text.hpp"
 #include "marrow/read/camera_file.hpp"
 #include "marrow/read/case_fragments.hpp"
-#include "marrow/toolbox/files/escaped_name.hpp"
-#include "marrow/toolbox/files/image_doubts.hpp"
-#include "marrow/toolbox/files/image_sides.hpp"
 #include "marrow/toolbox/files/input_file.hpp"
-#include "marrow/toolbox/files/stated_deviations.hpp"
-#include "marrow/toolbox/files/volume_doubts.hpp"
 #include "marrow/toolbox/files/volume_file.hpp"
-#include "marrow/toolbox/files/yaml_values.hpp"
 
 namespace {
 
 namespace fs = std::filesystem;
-using marrow::files::YamlFile;
-using marrow::files::YamlMap;
+using marrow::files::YamlFile, marrow::files::YamlMap;
 
 constexpr std::size_t kMostViews = 1000;
 
-using marrow::read::CaseFiles;
-using marrow::read::file_in;
-using marrow::read::read_or_fault;
+using marrow::read::CaseFiles, marrow::read::file_in, marrow::read::read_or_fault;
 
 struct Options {
   fs::path path;

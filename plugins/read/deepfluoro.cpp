@@ -6,7 +6,6 @@
 #include <marrow/plugin.hpp>
 
 #include "marrow/base/names.hpp"
-#include "marrow/base/number_text.hpp"
 #include "marrow/toolbox/exchange/deepfluoro_file.hpp"
 
 namespace {

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <marrow/plugin.hpp>
 
-#include "marrow/toolbox/files/image_doubts.hpp"
 #include "marrow/toolbox/files/volume_file.hpp"
 
 namespace {

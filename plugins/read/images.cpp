@@ -2,8 +2,7 @@
 #include <marrow/plugin.hpp>
 
 #include "marrow/base/names.hpp"
-#include "marrow/toolbox/files/escaped_name.hpp"
-#include "marrow/toolbox/files/image_doubts.hpp"
+#include "marrow/toolbox/files/input_file.hpp"
 #include "marrow/toolbox/files/volume_file.hpp"
 
 namespace {

@@ -2,7 +2,6 @@
 #include <marrow/plugin.hpp>
 #include <tuple>
 
-#include "marrow/base/number_text.hpp"
 #include "marrow/toolbox/exchange/surface_file.hpp"
 #include "marrow/toolbox/files/yaml_values.hpp"
 #include "marrow/toolbox/geometry/implant.hpp"
@@ -11,8 +10,7 @@ namespace {
 
 using namespace marrow;
 using files::FreeKeys, files::YamlFile, files::YamlMap;
-using geometry::Hole;
-using geometry::Implant;
+using geometry::Hole, geometry::Implant;
 
 struct Options {
   std::filesystem::path holes;

@@ -2,8 +2,7 @@
 // An implant's poses from JointTrack. Its calibration is a camera file, so read.views and read.camera read that.
 #include <marrow/plugin.hpp>
 
-#include "marrow/base/number_text.hpp"
-#include "marrow/toolbox/exchange/jointtrack_poses.hpp"
+#include "marrow/toolbox/exchange/jointtrack.hpp"
 
 namespace {
 

@@ -2,15 +2,11 @@
 // Reads the segmentation of another program, one mask for each fragment.
 #include <marrow/plugin.hpp>
 
-#include "marrow/base/number_text.hpp"
 #include "marrow/toolbox/files/label_file.hpp"
 
 namespace {
 
-using marrow::List;
-using marrow::Volume;
-using marrow::files::LabelMap;
-using marrow::files::Segment;
+using marrow::List, marrow::Volume, marrow::files::LabelMap, marrow::files::Segment;
 
 /// More labels than any program finds in a body: each would become a volume.
 constexpr std::size_t kMostUnnamed = 1000;

@@ -3,9 +3,7 @@
 #include <marrow/plugin.hpp>
 
 #include "marrow/base/names.hpp"
-#include "marrow/base/number_text.hpp"
-#include "marrow/base/yaml.hpp"
-#include "marrow/toolbox/exchange/marked_values.hpp"
+#include "marrow/toolbox/exchange/markups.hpp"
 #include "marrow/toolbox/exchange/xreg_file.hpp"
 #include "marrow/toolbox/files/yaml_values.hpp"
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <marrow/plugin.hpp>
 
-#include "marrow/toolbox/exchange/marked_values.hpp"
+#include "marrow/toolbox/exchange/markups.hpp"
 #include "marrow/toolbox/files/yaml_values.hpp"
 
 namespace {

@@ -3,12 +3,9 @@
 #include <marrow/plugin.hpp>
 
 #include "marrow/base/names.hpp"
-#include "marrow/base/number_text.hpp"
-#include "marrow/read/view_file.hpp"
-#include "marrow/toolbox/files/image_doubts.hpp"
-#include "marrow/toolbox/files/sequence_files.hpp"
+#include "marrow/read/camera_file.hpp"
 #include "marrow/toolbox/files/volume_file.hpp"
-#include "marrow/toolbox/track/sequence.hpp"
+#include "marrow/toolbox/track/track_state.hpp"
 #include "video.hpp"
 
 namespace {

@@ -1,15 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 // Checks for nodes that read one file. Files that are no data of theirs must be refused with their name. A file that
 // this suite writes in a common format, whose values are known, must be read as it is.
-#include "suite.hpp"
-
 #include <algorithm>
 #include <fstream>
+#include <marrow/plugin.hpp>
 #include <opencv2/core.hpp>
 #include <random>
 
-#include "marrow/base/number_text.hpp"
-#include "marrow/runtime/node/types.hpp"
 #include "marrow/toolbox/analytic/body.hpp"
 
 namespace marrow::conformance {
@@ -158,8 +155,6 @@ double volume_off_hu(const Subject& subject) {
   return most;
 }
 
-}  // namespace
-
 Suite read_suite() {
   Suite suite;
   suite.accuracy = {
@@ -173,4 +168,7 @@ Suite read_suite() {
   return suite;
 }
 
+}  // namespace
 }  // namespace marrow::conformance
+
+MARROW_PLUGIN(plugin) { plugin.suite("read", marrow::conformance::read_suite()); }

@@ -2,8 +2,6 @@
 // Reads a bone's poses from Autoscoper's format (.tra).
 #include <marrow/plugin.hpp>
 
-#include "marrow/toolbox/track/autoscoper_frame.hpp"
-#include "marrow/toolbox/track/sequence.hpp"
 #include "marrow/toolbox/track/tra_file.hpp"
 
 namespace {

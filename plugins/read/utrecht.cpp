@@ -4,7 +4,6 @@
 #include <marrow/plugin.hpp>
 
 #include "marrow/base/names.hpp"
-#include "marrow/base/number_text.hpp"
 #include "marrow/toolbox/exchange/utrecht_file.hpp"
 
 namespace {

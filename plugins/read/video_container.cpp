@@ -8,7 +8,6 @@
 
 #include "marrow/base/error.hpp"
 #include "marrow/toolbox/files/header_lines.hpp"
-#include "marrow/toolbox/files/input_file.hpp"
 
 namespace marrow::read {
 namespace {

@@ -1,9 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <marrow/plugin.hpp>
 
-#include "marrow/read/view_file.hpp"
-#include "marrow/toolbox/files/image_doubts.hpp"
-#include "marrow/toolbox/files/image_sides.hpp"
+#include "marrow/read/camera_file.hpp"
+#include "marrow/toolbox/files/volume_file.hpp"
 
 namespace {
 

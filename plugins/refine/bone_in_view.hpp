@@ -4,7 +4,6 @@
 
 #include <array>
 #include <marrow/domain/decompositions.hpp>
-#include <marrow/plugin.hpp>
 
 #include "marrow/toolbox/match/views_cost.hpp"
 

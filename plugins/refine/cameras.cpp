@@ -1,18 +1,112 @@
 // SPDX-License-Identifier: Apache-2.0
 // Corrects cameras that are a little off, together with the poses of the bones that they show. refinement.hpp says how.
+#include <algorithm>
+#include <array>
+#include <cmath>
 #include <marrow/base/names.hpp>
-#include <marrow/plugin.hpp>
+#include <string>
+#include <vector>
 
-#include "determined.hpp"
-#include "marrow/base/number_text.hpp"
-#include "marrow/toolbox/search/compared.hpp"
 #include "marrow/toolbox/search/search.hpp"
 #include "refinement.hpp"
 
 namespace {
 
 using namespace marrow;
-using refine::from_units, refine::Options, refine::Refinement;
+using namespace refine;
+
+// What the images tell about a camera, in figures and in words. A motion m of what the camera shows comes from errors p
+// of its parameters, m = G p, with p expected to have the covariance D. If the images leave m with the mean M and the
+// covariance S, then p has the mean K M and the covariance D - K (G D G^T - S) K^T, with K = D G^T (G D G^T)^-1
+// (Gaussian conditioning): errors that show the same motion share it as their variances tell.
+
+/// A figure of a camera: a motion, or a parameter that may cause one.
+struct Figure {
+  const char *name, *unit, *words;
+};
+constexpr std::array<Figure, 9> kFigures{{{"rotation_u", "deg", "rotation about u"},
+                                          {"rotation_v", "deg", "rotation about v"},
+                                          {"rotation_depth", "deg", "rotation about the depth"},
+                                          {"shift_u", "mm", "shift along u"},
+                                          {"shift_v", "mm", "shift along v"},
+                                          {"shift_depth", "mm", "shift along the depth"},
+                                          {"focal", "percent", "focal length"},
+                                          {"centre_u", "px", "principal point along u"},
+                                          {"centre_v", "px", "principal point along v"}}};
+using Numbers = Eigen::Matrix<double, 9, 1>;
+
+std::string unit_of(const Figure& figure) { return std::string(figure.unit) == "percent" ? "%" : figure.unit; }
+
+/// The names of the figures, as cameras.cpp declares them.
+std::vector<std::string> figures() {
+  std::vector<std::string> names;
+  for (const std::string before : {"", "predicted_"})
+    for (const Figure& figure : kFigures) names.push_back(before + figure.name + "_" + figure.unit);
+  for (const Figure& figure : kFigures) names.push_back(std::string("determined_") + figure.name);
+  return names;
+}
+
+/// The first three parameters: focal length and principal point.
+struct Parameters {
+  Eigen::Vector3d mean, deviation, expected;
+};
+Parameters parameters_of(const Sight& sight, const Vector6d& motion, const Matrix6d& covariance) {
+  const Eigen::MatrixXd expected = sight.parameter_deviations.cwiseAbs2().asDiagonal(),
+                        crossed = expected * sight.by_parameters.transpose();
+  const Matrix6d of_motion = sight.by_parameters * crossed;
+  const Eigen::MatrixXd gain = crossed * inverse_of_symmetric(of_motion);
+  const Eigen::MatrixXd left = expected - gain * (of_motion - covariance) * gain.transpose();
+  return {(gain * motion).head<3>(), left.diagonal().head<3>().cwiseMax(0).cwiseSqrt(),
+          sight.parameter_deviations.head<3>()};
+}
+
+/// How much of what was expected the images took away: 0 if a number is as uncertain as before, 1 if it is known.
+Numbers determined(const Numbers& deviation, const Numbers& expected) {
+  Numbers share = Numbers::Zero();
+  for (Eigen::Index i = 0; i < share.size(); ++i)
+    if (expected[i] > 0) share[i] = std::max(0.0, 1 - std::pow(deviation[i] / expected[i], 2));
+  return share;
+}
+
+Metrics metrics_of(const Sight& sight, const Vector6d& motion, const Matrix6d& covariance) {
+  const Parameters parameters = parameters_of(sight, motion, covariance);
+  Numbers mean, deviation, expected;
+  mean << motion, parameters.mean;
+  deviation << covariance.diagonal().cwiseSqrt(), parameters.deviation;
+  expected << sight.deviation(), parameters.expected;
+  const Numbers share = determined(deviation, expected);
+  Metrics metrics;
+  const std::vector<std::string> names = figures();
+  for (std::size_t i = 0; i < kFigures.size(); ++i)
+    metrics.items.push_back({names[i], mean[Eigen::Index(i)], unit_of(kFigures[i])});
+  for (std::size_t i = 0; i < kFigures.size(); ++i)
+    metrics.items.push_back({names[kFigures.size() + i], deviation[Eigen::Index(i)], unit_of(kFigures[i])});
+  for (std::size_t i = 0; i < kFigures.size(); ++i)
+    metrics.items.push_back({names[2 * kFigures.size() + i], 100 * share[Eigen::Index(i)], "%"});
+  return metrics;
+}
+
+/// Which of the expected errors the images determine by at least half of their variance, and which they leave open.
+std::vector<std::string> words_of(const std::string& view, const Sight& sight, const Matrix6d& covariance) {
+  const Parameters parameters = parameters_of(sight, Vector6d::Zero(), covariance);
+  Numbers deviation, expected;
+  deviation << covariance.diagonal().cwiseSqrt(), parameters.deviation;
+  expected << sight.deviation(), parameters.expected;
+  const Numbers share = determined(deviation, expected);
+  std::string known, open;
+  for (std::size_t i = 0; i < kFigures.size(); ++i) {
+    if (!(expected[Eigen::Index(i)] > 0)) continue;
+    std::string& names = share[Eigen::Index(i)] < 0.5 ? open : known;
+    names += (names.empty() ? "" : ", ") + std::string(kFigures[i].words) +
+             formatted(" ({:.0f} %)", 100 * share[Eigen::Index(i)]);
+  }
+  std::vector<std::string> lines;
+  if (!known.empty()) lines.push_back("view '" + view + "': the images determine its camera's " + known);
+  if (!open.empty())
+    lines.push_back("view '" + view + "': the images do not determine its camera's " + open +
+                    "; what is expected of them counts in the poses' deviations");
+  return lines;
+}
 
 struct Result {
   List<View> views;
@@ -101,8 +195,8 @@ Result refined(const List<View>& views, const List<Cost>& costs, const List<Pose
     view.camera.camera_from_world.rotation = nearest_rotation(view.camera.camera_from_world.rotation);
     result.views.add(views.name(v), view);
     const Matrix6d covariance = refinement.covariance_of_motion(v);
-    result.motions.add(views.name(v), refine::metrics_of(refinement.sight(v), motion, covariance));
-    for (const std::string& line : refine::words_of(views.name(v), refinement.sight(v), covariance)) context.info(line);
+    result.motions.add(views.name(v), metrics_of(refinement.sight(v), motion, covariance));
+    for (const std::string& line : words_of(views.name(v), refinement.sight(v), covariance)) context.info(line);
     warn_of_large(views.name(v), motion.cwiseQuotient(refinement.sight(v).deviation()), context);
   }
   for (std::size_t f = 0; f < poses.size(); ++f) {
@@ -177,11 +271,10 @@ MARROW_PLUGIN(plugin) {
                 "determined_centre_v"})
       .option("turn_deg", &Options::turn_deg, "root mean square of the cameras' rotations", at_least(1e-6))
       .option("shift_mm", &Options::shift_mm, "root mean square of the cameras' shifts", at_least(1e-6))
-      .option(
-          "focal_percent", &Options::focal_percent,
-          "root mean square error of the focal lengths, such as 10 if the header gives no distance; it is corrected "
-          "by a shift along the depth, which shows the bone in the same size",
-          at_least(0))
+      .option("focal_percent", &Options::focal_percent,
+              "root mean square error of the focal lengths, such as 10 if the header gives no distance; it is "
+              "corrected by a shift along the depth, which shows the bone in the same size",
+              at_least(0))
       .option("centre_px", &Options::centre_px,
               "root mean square error of the principal points, such as 100 for a crop whose place is not known; it is "
               "corrected by a shift across the depth",

@@ -6,14 +6,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <marrow/domain/decompositions.hpp>
-#include <marrow/plugin.hpp>
 #include <memory>
 #include <numeric>
 #include <utility>
 #include <vector>
 
-#include "bone_in_view.hpp"
 #include "sight.hpp"
 
 namespace marrow::refine {

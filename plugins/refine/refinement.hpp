@@ -4,27 +4,20 @@
 // off by the same motion, for all bones. So no image has to be projected again: a cost that can be split into views
 // tells which pose each view alone prefers. The unknowns are the poses of the bones and one motion for each view. They
 // minimise the sum of the costs, in units of their noise, and of the squares of the motions, in units of the deviations
-// expected of a calibration (a Gaussian prior, camera_prior.hpp). Levenberg-Marquardt steps find the minimum. The
+// expected of a calibration (a Gaussian prior, CameraPrior). Levenberg-Marquardt steps find the minimum. The
 // curvature there gives the covariance of all poses and motions together (Laplace's approximation).
 #include <tbb/parallel_for.h>
 
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
-#include <marrow/domain/decompositions.hpp>
-#include <marrow/plugin.hpp>
 #include <memory>
 #include <optional>
 #include <string>
 #include <utility>
 #include <vector>
 
-#include "bone_in_view.hpp"
-#include "camera_prior.hpp"
 #include "coarse_search.hpp"
-#include "sight.hpp"
-
-#include "marrow/base/number_text.hpp"
 
 namespace marrow::refine {
 

@@ -7,7 +7,6 @@
 
 #include <marrow/domain/decompositions.hpp>
 #include "closest_points.hpp"
-#include "marrow/base/number_text.hpp"
 
 namespace {
 

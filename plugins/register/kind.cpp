@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <marrow/plugin.hpp>
 
-#include "suite.hpp"
-
 MARROW_PLUGIN(plugin) {
   plugin.kind("register")
       .summary("pose of least cost, with its predicted uncertainty")
@@ -17,6 +15,5 @@ MARROW_PLUGIN(plugin) {
       .in<marrow::Mesh>("model", "surface of the fragment")
       .in<marrow::Mesh>("target", "surface in world coordinates, of the whole fragment or a part")
       .out<marrow::Pose>("pose", "pose of least cost, with its predicted covariance")
-      .out<marrow::Pose>("stages", "poses of the search, from the start to the final one", marrow::over("stage"))
-      .suite(marrow::conformance::register_suite());
+      .out<marrow::Pose>("stages", "poses of the search, from the start to the final one", marrow::over("stage"));
 }

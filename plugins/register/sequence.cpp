@@ -1,8 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <marrow/plugin.hpp>
-
-#include "marrow/base/number_text.hpp"
-#include "marrow/toolbox/geometry/start_axes.hpp"
+#include "marrow/toolbox/geometry/fragments.hpp"
 #include "marrow/toolbox/search/search.hpp"
 
 namespace {

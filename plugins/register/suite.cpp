@@ -2,16 +2,13 @@
 // Checks for registrations on a body at a known pose: by a cost that is a bowl about this pose, by its outline in two
 // views, and by its surface. Where there is nothing to compare, no pose may be found: it would be known to a deviation
 // of 0.
-#include "suite.hpp"
-
 #include <algorithm>
 #include <cmath>
+#include <marrow/plugin.hpp>
 #include <numeric>
-
 #include "marrow/domain/random.hpp"
-#include "marrow/runtime/node/types.hpp"
-#include "marrow/toolbox/analytic/compass.hpp"
-#include "marrow/toolbox/analytic/costs.hpp"
+#include "marrow/toolbox/analytic/functions.hpp"
+#include "marrow/toolbox/geometry/targets.hpp"
 
 namespace marrow::conformance {
 namespace {
@@ -124,9 +121,7 @@ void validate(const Inputs&, const std::vector<PortInfo>& ports, const std::vect
 double off_mm(const Subject& subject, const Inputs& inputs) {
   static const std::vector<Eigen::Vector3d> kPoints = sample_surface(mesh_of(bone()), 200);
   const RigidTransform found = subject.output(inputs, "pose").as<Pose>().world_from_model;
-  double sum = 0;
-  for (const Eigen::Vector3d& point : kPoints) sum += (found * point - truth() * point).norm();
-  return sum / double(kPoints.size());
+  return geometry::mean(geometry::target_errors_mm(found, truth(), kPoints));
 }
 
 /// The outline of the bone in two views, with errors. It has other minima than the truth, as costs of real images have.
@@ -234,8 +229,6 @@ std::vector<Trial> trials() {
        }}};
 }
 
-}  // namespace
-
 Suite register_suite() {
   Suite suite;
   suite.sample = sample;
@@ -247,10 +240,7 @@ Suite register_suite() {
       {{"truth", "mean distance of the surface from the true pose, from a start 4 degrees and mm off", 0.5, "mm"},
        [](const Subject& subject) { return off_mm(subject, sample()); }},
       {{"starts_mean", of_starts + "the mean", 0.5, "mm"},
-       [](const Subject& subject) {
-         const std::vector<double> offs_mm = offs_from_drawn_starts_mm(subject);
-         return std::accumulate(offs_mm.begin(), offs_mm.end(), 0.0) / double(offs_mm.size());
-       }},
+       [](const Subject& subject) { return geometry::mean(offs_from_drawn_starts_mm(subject)); }},
       {{"starts_worst", of_starts + "the worst", 1, "mm"},
        [](const Subject& subject) {
          const std::vector<double> offs_mm = offs_from_drawn_starts_mm(subject);
@@ -268,4 +258,7 @@ Suite register_suite() {
   return suite;
 }
 
+}  // namespace
 }  // namespace marrow::conformance
+
+MARROW_PLUGIN(plugin) { plugin.suite("register", marrow::conformance::register_suite()); }

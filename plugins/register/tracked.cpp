@@ -5,10 +5,8 @@
 #include <algorithm>
 #include <cmath>
 #include <marrow/domain/decompositions.hpp>
-#include <marrow/plugin.hpp>
 
-#include "marrow/toolbox/geometry/start_axes.hpp"
-#include "marrow/toolbox/search/compared.hpp"
+#include "marrow/toolbox/geometry/fragments.hpp"
 #include "marrow/toolbox/search/search.hpp"
 #include "marrow/toolbox/track/motion_model.hpp"
 

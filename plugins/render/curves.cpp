@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 // Figures over the frames of a sequence, a plot for each figure.
-#include <algorithm>
-#include <limits>
 #include <marrow/plugin.hpp>
 
 #include "marrow/render/plot.hpp"
@@ -10,9 +8,7 @@
 namespace {
 
 using namespace marrow::draw;
-using marrow::List;
-using marrow::Metric;
-using marrow::Metrics;
+using marrow::List, marrow::Metric, marrow::Metrics;
 
 struct Options {
   std::vector<std::string> figures;

@@ -1,9 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Six plots of the cost around a pose (Fig. 7b of the chapter).
-#include <cmath>
 #include <marrow/plugin.hpp>
 
-#include "marrow/base/number_text.hpp"
 #include "marrow/render/plot.hpp"
 #include "marrow/toolbox/draw/canvas.hpp"
 

@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 // Draws the model's outline over an X-ray view, before and after registration (Fig. 8 of the chapter).
-#include <algorithm>
-#include <cmath>
 #include <marrow/plugin.hpp>
 
 #include "marrow/toolbox/draw/canvas.hpp"

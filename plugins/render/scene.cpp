@@ -2,8 +2,6 @@
 // Draws the models in their poses, shaded, as seen from the X-ray source, beside the X-ray itself (Fig. 8 of the
 // chapter).
 #include <Eigen/LU>
-#include <algorithm>
-#include <cmath>
 #include <marrow/plugin.hpp>
 #include <opencv2/imgproc.hpp>
 

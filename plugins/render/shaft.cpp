@@ -1,10 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // Draws the pair of lines that was chosen as the shaft's outer borders, and the rejected pairs with the reasons (Fig. 4
 // of the chapter).
-#include <algorithm>
 #include <marrow/plugin.hpp>
 
-#include "marrow/base/number_text.hpp"
 #include "marrow/toolbox/draw/canvas.hpp"
 
 namespace {

@@ -1,18 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 // A hexapod is fixed beside the patient and grips the distal fragment. Its place is known only roughly.
-#include <marrow/plugin.hpp>
 
-#include "held.hpp"
-
-#include "marrow/base/number_text.hpp"
-#include "marrow/toolbox/robotics/hexapod_options.hpp"
+#include "marrow/robot/contact.hpp"
 
 namespace {
 
 using namespace marrow;
-using robot::Held;
-using robot::RobotReport;
-using robot::RobotState;
+using robot::Held, robot::RobotReport, robot::RobotState;
 
 struct Options : robot::HexapodShape, robot::HexapodLimits, robot::RobotErrors, robot::SoftTissue, robot::ForceLimits {
   Options() {
@@ -21,8 +15,7 @@ struct Options : robot::HexapodShape, robot::HexapodLimits, robot::RobotErrors, 
   }
   std::string moved = "distal", reference = "proximal";
   double held_at_mm = 120;
-  Eigen::Vector3d stand_off_deg{6, -5, 6};
-  Eigen::Vector3d stand_off_mm{29, -29, 29};
+  Eigen::Vector3d stand_off_deg{6, -5, 6}, stand_off_mm{29, -29, 29};
 };
 
 struct Result {

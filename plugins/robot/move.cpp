@@ -1,21 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 // A robot makes a motion in small parts. It stops before a force that is too large, and where it cannot go on.
-#include <algorithm>
-#include <cmath>
-#include <marrow/plugin.hpp>
 
-#include "held.hpp"
-#include "marrow/base/number_text.hpp"
 #include "marrow/domain/random.hpp"
+#include "marrow/robot/contact.hpp"
 
 namespace {
 
 using namespace marrow;
-using robot::Held;
-using robot::Hexapod;
-using robot::Load;
-using robot::RobotReport;
-using robot::RobotState;
+using robot::Held, robot::Hexapod, robot::Load, robot::RobotReport, robot::RobotState;
 
 struct Result {
   RobotState state;

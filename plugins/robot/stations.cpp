@@ -1,10 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Before it grips the fragment, a robot shows a target with beads on its hand to the C-arm, in several poses.
-#include <algorithm>
-#include <cmath>
-#include <marrow/plugin.hpp>
 
-#include "marrow/base/number_text.hpp"
 #include "marrow/domain/random.hpp"
 #include "marrow/toolbox/phantom/board_views.hpp"
 #include "marrow/toolbox/robotics/robot_state.hpp"

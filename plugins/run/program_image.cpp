@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "marrow/run/program_node.hpp"
+#include "marrow/run/program_call.hpp"
 #include "marrow/toolbox/files/volume_file.hpp"
 
 namespace {

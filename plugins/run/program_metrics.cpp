@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "marrow/run/metrics_file.hpp"
-#include "marrow/run/program_node.hpp"
+#include "marrow/run/program_call.hpp"
 
 namespace {
 

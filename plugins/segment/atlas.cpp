@@ -6,15 +6,11 @@
 // belongs to the fragment of the nearest seed.
 #include <Eigen/Geometry>
 #include <cmath>
-#include <marrow/plugin.hpp>
-
 #include <marrow/domain/decompositions.hpp>
-#include "marrow/base/number_text.hpp"
+#include <marrow/plugin.hpp>
 #include "marrow/segment/expansion.hpp"
 #include "marrow/segment/fragments.hpp"
-#include "marrow/segment/seed_points.hpp"
 #include "marrow/toolbox/field/interior.hpp"
-#include "marrow/toolbox/field/mesh_field.hpp"
 
 namespace {
 

@@ -8,12 +8,10 @@
 // what the front from the fragment's seeds reaches (expansion.hpp), with everything that it encloses.
 #include <tbb/parallel_for.h>
 
-#include <cmath>
 #include <marrow/plugin.hpp>
 
 #include "marrow/segment/expansion.hpp"
 #include "marrow/segment/fragments.hpp"
-#include "marrow/segment/seed_points.hpp"
 #include "marrow/toolbox/field/interior.hpp"
 
 namespace {

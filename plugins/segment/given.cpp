@@ -3,14 +3,10 @@
 // surface. What comes after needs only their fields.
 #include <tbb/parallel_for.h>
 
-#include <Eigen/Geometry>
-#include <algorithm>
-#include <cmath>
 #include <marrow/plugin.hpp>
 
-#include "marrow/base/number_text.hpp"
 #include "marrow/toolbox/field/binary_surface.hpp"
-#include "marrow/toolbox/field/mesh_field.hpp"
+#include "marrow/toolbox/field/interior.hpp"
 
 namespace {
 

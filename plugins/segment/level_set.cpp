@@ -4,28 +4,21 @@
 // (expansion.hpp), with everything inside filled. They come to rest on the edges in the CT.
 #include <marrow/plugin.hpp>
 
-#include "marrow/base/number_text.hpp"
 #include "marrow/segment/expansion.hpp"
-#include "marrow/segment/fragments.hpp"
 #include "marrow/segment/front.hpp"
-#include "marrow/segment/seed_points.hpp"
 
 namespace {
 
 using namespace marrow;
-using segment::EdgeProfile;
-using segment::Force;
-using segment::Front;
+using segment::EdgeProfile, segment::Force, segment::Front;
 
 struct Options {
   double band_voxels = 5;
   double sigma_mm = 0.7;
-  double cleft_mm = 3.2;
-  double cleft_fraction = 0.1;
+  double cleft_mm = 3.2, cleft_fraction = 0.1;
   double floor_hu = 150;
   double propagation = 0;
-  double edge_hu = 150;
-  double edge_sigma_mm = 0.4;
+  double edge_hu = 150, edge_sigma_mm = 0.4;
   double blur_mm = 0.7;
   double cortex_hu = 1200;
   double curvature_mm = 0.1;

@@ -5,14 +5,10 @@
 // them. The surface passes where the probability, interpolated between the voxels, crosses its threshold.
 #include <tbb/parallel_for.h>
 
-#include <array>
-#include <deque>
 #include <marrow/plugin.hpp>
 #include <opencv2/imgproc.hpp>
 
-#include "marrow/base/number_text.hpp"
 #include "marrow/segment/fragments.hpp"
-#include "marrow/segment/seed_points.hpp"
 #include "marrow/toolbox/network/inference.hpp"
 
 namespace {

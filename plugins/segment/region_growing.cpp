@@ -2,13 +2,9 @@
 // Seeded region growing (Adams and Bischof, IEEE Trans. Pattern Anal. Mach. Intell. 16, 1994). Of all voxels beside a
 // region, the voxel most similar to its region joins first. The regions of all fragments grow at the same time. So the
 // voxels between them join last, and a gap that is a little darker than the bone keeps the regions apart.
-#include <cmath>
-#include <deque>
 #include <marrow/plugin.hpp>
 
-#include "marrow/base/number_text.hpp"
 #include "marrow/segment/fragments.hpp"
-#include "marrow/segment/seed_points.hpp"
 
 namespace {
 

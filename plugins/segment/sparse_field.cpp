@@ -2,14 +2,11 @@
 // ITK's geodesic active contour (Caselles, Kimmel and Sapiro, IJCV 22, 1997) with Whitaker's sparse field (IJCV 29,
 // 1998), one contour for each fragment. It starts where the fast expansion from all seeds ended (expansion.hpp). Voxels
 // that the expansion gave to another fragment stay outside.
-#include <cmath>
 #include <marrow/plugin.hpp>
 
 #include "itk_contour.hpp"
-#include "marrow/base/number_text.hpp"
 #include "marrow/segment/expansion.hpp"
 #include "marrow/segment/fragments.hpp"
-#include "marrow/segment/seed_points.hpp"
 #include "marrow/toolbox/field/interior.hpp"
 
 namespace {

@@ -1,18 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 // Checks for segmentation on a hollow bone that is broken in two: a tube of cortical bone around marrow, in soft
 // tissue, with an oblique cut of 1.2 mm. It is sampled on the grid of a CT, with blur and noise.
-#include "suite.hpp"
-
-#include <Eigen/Geometry>
-#include <algorithm>
-#include <cmath>
+#include <marrow/plugin.hpp>
 #include <random>
 
-#include "marrow/base/number_text.hpp"
-#include "marrow/runtime/node/types.hpp"
-
-namespace marrow::conformance {
 namespace {
+
+using namespace marrow;
+using namespace marrow::conformance;
 
 constexpr double kOuter_mm = 12.4, kInner_mm = 7.2, kGap_mm = 1.2, kBlur_mm = 0.5, kNoise_hu = 30;
 constexpr double kCortex_hu = 1300, kMarrow_hu = -40, kTissue_hu = 45;
@@ -305,9 +300,7 @@ std::vector<Trial> trials() {
        }}};
 }
 
-}  // namespace
-
-Suite segment_suite() {
+Suite suite_of_kind() {
   Suite suite{[] { return inputs_of(tube(false)); }, validate, trials(), {}};
   // The limits are wide enough for a single global threshold, which cannot be right for cortical and spongy bone at
   // once.
@@ -316,8 +309,8 @@ Suite segment_suite() {
     const std::string prefix = turned ? "turned_" : "", of = ct + (turned ? ", rotated axes: " : ": ");
     const auto add = [&](const std::string& name, const std::string& what, double limit, const std::string& unit,
                          double (*measure)(const Subject&, const Tube&)) {
-      suite.accuracy.push_back({{prefix + name, of + what, limit, unit},
-                                [=](const Subject& subject) { return measure(subject, tube(turned)); }});
+      suite.add(prefix + name, of + what, limit, unit,
+                [=](const Subject& subject) { return measure(subject, tube(turned)); });
     };
     add("dice", "100 (1 - Dice) of the worse fragment", 12, "%", dice_error);
     add("wall_bias", "absolute value of the mean signed distance to the outer wall", 0.6, "mm", wall_bias);
@@ -328,4 +321,6 @@ Suite segment_suite() {
   return suite;
 }
 
-}  // namespace marrow::conformance
+}  // namespace
+
+MARROW_PLUGIN(plugin) { plugin.suite("segment", suite_of_kind()); }

@@ -2,9 +2,7 @@
 #include <marrow/plugin.hpp>
 #include <queue>
 
-#include "marrow/base/number_text.hpp"
 #include "marrow/segment/fragments.hpp"
-#include "marrow/segment/seed_points.hpp"
 
 namespace {
 
@@ -16,8 +14,7 @@ struct Options {
   double band_mm = 4;
 };
 
-using segment::for_neighbours;
-using segment::kNobody;
+using segment::for_neighbours, segment::kNobody;
 constexpr std::uint8_t kUnclaimed = 254;
 
 /// Gives each bright voxel to the fragment whose seed reaches it in the fewest steps through bright voxels.

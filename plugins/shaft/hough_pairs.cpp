@@ -4,8 +4,6 @@
 // one standard deviation, but this rejects a third of all femora in each view. Here widths have a likelihood, and a
 // limit of three standard deviations. The borders of the canal are rejected because their bright sides are on the wrong
 // side.
-#include <algorithm>
-#include <cmath>
 
 #include "marrow/shaft/pairs.hpp"
 

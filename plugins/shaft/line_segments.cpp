@@ -3,13 +3,10 @@
 // TPAMI 2010). It grows regions of equal gradient direction in the image and keeps those that are unlikely to be noise.
 // The segments only say where to search. The borders are fitted to the edge pixels beside them, so they are as accurate
 // as the edges. Then they are paired as in shaft.hough_pairs.
-#include <algorithm>
-#include <cmath>
 #include <opencv2/imgproc.hpp>
 
 #include "marrow/shaft/pairs.hpp"
-#include "marrow/toolbox/image/grey_range.hpp"
-#include "marrow/toolbox/image/line_integrals.hpp"
+#include "marrow/toolbox/image/grey_values.hpp"
 
 namespace {
 

@@ -2,9 +2,6 @@
 // Lines by random sample consensus, RANSAC (Fischler and Bolles, CACM 1981). Lines are found one after the other.
 // Candidates go through two random edge pixels whose gradients agree with the line. The candidate with the most edge
 // pixels is taken, and its pixels are removed before the next search. Then borders are paired as in shaft.hough_pairs.
-#include <algorithm>
-#include <cmath>
-#include <optional>
 #include <random>
 
 #include "marrow/shaft/pairs.hpp"

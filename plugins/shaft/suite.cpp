@@ -1,18 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 // Checks for nodes of the kind shaft, with the exact lines of a hollow cylinder in soft tissue. The edge pixels have
 // errors of position and direction, gaps and clutter. The image shows the same cylinder.
-#include "suite.hpp"
-
-#include <Eigen/Geometry>
-#include <algorithm>
-#include <array>
-#include <cmath>
+#include <marrow/plugin.hpp>
 #include <random>
 
-#include "marrow/runtime/node/types.hpp"
-
-namespace marrow::conformance {
 namespace {
+
+using namespace marrow;
+using namespace marrow::conformance;
 
 constexpr int kWidth = 480, kHeight = 512;
 constexpr double kFocal_px = 1700, kDistance_mm = 600, kThigh_mm = 70;
@@ -315,41 +310,38 @@ std::vector<Trial> trials() {
            }}};
 }
 
-}  // namespace
-
-Suite shaft_suite() {
+Suite suite_of_kind() {
   Suite suite{[] { return inputs_of(bones()[0]); }, validate, trials(), {}};
   const std::string of =
       "8 hollow cylinders in soft tissue, edges with errors of 0.6 px, 15 % of them missing, clutter: ";
-  const auto add = [&](const std::string& name, const std::string& what, double limit, const std::string& unit,
-                       std::function<double(const Subject&)> measure) {
-    suite.accuracy.push_back({{name, what, limit, unit}, std::move(measure)});
-  };
   const auto error = [](const Bone& bone, const ShaftLines& lines) {
     return error_of(lines.left, lines.right, tangents(bone, bone.outer_mm));
   };
-  add("right_pair", of + "pairs that are not the outer borders", 0, "%", wrong_percent);
-  add("angle", of + "largest angle between a border and the true one", 0.15, "deg", [=](const Subject& subject) {
+  suite.add("right_pair", of + "pairs that are not the outer borders", 0, "%", wrong_percent);
+  suite.add("angle", of + "largest angle between a border and the true one", 0.15, "deg", [=](const Subject& subject) {
     return largest(subject, [=](const Bone& bone, const ShaftLines& lines) { return error(bone, lines).angle_deg; });
   });
-  add("offset", of + "largest distance from the middle of a border to the true one", 0.1, "mm",
-      [=](const Subject& subject) {
-        return largest(subject,
-                       [=](const Bone& bone, const ShaftLines& lines) { return error(bone, lines).middle_mm; });
-      });
-  add("width", of + "largest error of the width, in units of the deviation that the node gives", 3, "sigma",
-      width_error);
-  add("length", of + "largest part of the shaft that the borders miss", 25, "%", length_missed);
-  add("canal_named", of + "cases in which the rejected pairs do not include the canal", 13, "%", canal_unseen_percent);
-  add("canal_alone", "refuses an image with no other edges than the canal's borders", 0, "",
-      [](const Subject& subject) {
-        return refuses(subject, {false, true, false, 120});
-      });
-  add("tissue_alone", "refuses an image with no other edges than the limb's borders", 0, "",
-      [](const Subject& subject) {
-        return refuses(subject, {false, false, true, 120});
-      });
+  suite.add("offset", of + "largest distance from the middle of a border to the true one", 0.1, "mm",
+            [=](const Subject& subject) {
+              return largest(subject,
+                             [=](const Bone& bone, const ShaftLines& lines) { return error(bone, lines).middle_mm; });
+            });
+  suite.add("width", of + "largest error of the width, in units of the deviation that the node gives", 3, "sigma",
+            width_error);
+  suite.add("length", of + "largest part of the shaft that the borders miss", 25, "%", length_missed);
+  suite.add("canal_named", of + "cases in which the rejected pairs do not include the canal", 13, "%",
+            canal_unseen_percent);
+  suite.add("canal_alone", "refuses an image with no other edges than the canal's borders", 0, "",
+            [](const Subject& subject) {
+              return refuses(subject, {false, true, false, 120});
+            });
+  suite.add("tissue_alone", "refuses an image with no other edges than the limb's borders", 0, "",
+            [](const Subject& subject) {
+              return refuses(subject, {false, false, true, 120});
+            });
   return suite;
 }
 
-}  // namespace marrow::conformance
+}  // namespace
+
+MARROW_PLUGIN(plugin) { plugin.suite("shaft", suite_of_kind()); }

@@ -7,12 +7,13 @@
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 
-#include "marrow/base/number_text.hpp"
 #include "marrow/similarity/edge_loss.hpp"
 #include "marrow/toolbox/match/nearest_edges.hpp"
 #include "marrow/toolbox/match/views_cost.hpp"
 
 namespace {
+
+using namespace marrow;
 
 struct Options {
   int pixel_step = 2;
@@ -32,7 +33,7 @@ struct DrawnEdge {
 /// Ridges of the gradient's magnitude. A parabola across the ridge gives the sub-pixel position (Canny 1986; Devernay
 /// 1995). The weight rises from 0 at the threshold to 1 at twice the threshold, so that no edge appears or vanishes
 /// suddenly.
-std::vector<DrawnEdge> edges_of(const cv::Mat& radiograph, const marrow::PixelGrid& grid, double threshold_percent) {
+std::vector<DrawnEdge> edges_of(const cv::Mat& radiograph, const PixelGrid& grid, double threshold_percent) {
   cv::Mat du, dv, magnitude;
   cv::Sobel(radiograph, du, CV_32F, 1, 0, 3, 0.125);
   cv::Sobel(radiograph, dv, CV_32F, 0, 1, 3, 0.125);
@@ -73,13 +74,13 @@ std::vector<DrawnEdge> edges_of(const cv::Mat& radiograph, const marrow::PixelGr
 
 /// Data that does not depend on the level. It is made once and shared by all levels.
 struct Scene {
-  const marrow::RadiographProjector* projector;
-  marrow::List<marrow::View> views;
-  std::vector<marrow::match::NearestEdges> edges;
+  const RadiographProjector* projector;
+  List<View> views;
+  std::vector<match::NearestEdges> edges;
   Options options;
 };
 
-class DrrEdges : public marrow::match::ViewsCost {
+class DrrEdges : public match::ViewsCost {
  public:
   DrrEdges(std::shared_ptr<const Scene> scene, int pixel_step, double reach_px)
       : ViewsCost(scene->views.size(), scene->options.weights),
@@ -88,51 +89,50 @@ class DrrEdges : public marrow::match::ViewsCost {
         reach_px_(reach_px),
         loss_(scene_->options.scale_px, reach_px) {}
 
-  double value_in_view(std::size_t view, const marrow::RigidTransform& world_from_model) const override {
+  double value_in_view(std::size_t view, const RigidTransform& world_from_model) const override {
     return value_of(sums(view, world_from_model).all());
   }
 
-  std::shared_ptr<const marrow::Cost> at_level(const marrow::CostLevel& level) const override {
+  std::shared_ptr<const Cost> at_level(const CostLevel& level) const override {
     return std::make_shared<DrrEdges>(scene_, level.pixel_step > 0 ? level.pixel_step : step_, level.reach_px);
   }
 
  private:
-  std::string silence(std::size_t view, const marrow::RigidTransform& world_from_model) const override {
-    return marrow::match::in_view(scene_->views, view, silence_of(view, world_from_model));
+  std::string silence(std::size_t view, const RigidTransform& world_from_model) const override {
+    return match::in_view(scene_->views, view, silence_of(view, world_from_model));
   }
-  std::string silence_of(std::size_t view, const marrow::RigidTransform& world_from_model) const {
-    const marrow::match::BlockSums::Sums found = sums(view, world_from_model).all();
+  std::string silence_of(std::size_t view, const RigidTransform& world_from_model) const {
+    const match::BlockSums::Sums found = sums(view, world_from_model).all();
     if (!(found.weights > 0))
       return scene_->views[view].mask.empty()
                  ? "it shows no edge of the radiograph, which is empty or outside the image"
                  : "no edge of the radiograph lies inside image and mask";
     const double gain = loss_.worst() - found.values / found.weights;
     if (gain > 1e-9 * loss_.worst()) return {};
-    return marrow::formatted("no edge lies within {:.3g} px of the radiograph's edges", reach_px_);
+    return formatted("no edge lies within {:.3g} px of the radiograph's edges", reach_px_);
   }
 
   /// A view that shows very few edges of the radiograph is no evidence.
-  double value_of(const marrow::match::BlockSums::Sums& sums) const {
+  double value_of(const match::BlockSums::Sums& sums) const {
     const double least = 60.0 / step_;
     return (sums.values + std::max(0.0, least - sums.weights) * loss_.worst()) / std::max(sums.weights, least);
   }
 
-  Split split(std::size_t view, const marrow::RigidTransform& world_from_model) const override {
-    const marrow::match::BlockSums found = sums(view, world_from_model);
+  Split split(std::size_t view, const RigidTransform& world_from_model) const override {
+    const match::BlockSums found = sums(view, world_from_model);
     return {value_of(found.all()), found.without_each([&](const auto& left) { return value_of(left); })};
   }
 
   /// The loss of each edge of the radiograph.
-  marrow::match::BlockSums sums(std::size_t index, const marrow::RigidTransform& world_from_model) const {
-    const marrow::View& view = scene_->views[index];
-    const marrow::Camera& camera = view.camera;
-    const marrow::PixelGrid region = scene_->projector->region(camera, world_from_model);
-    marrow::match::BlockSums found(marrow::match::Blocks::of(camera));
+  match::BlockSums sums(std::size_t index, const RigidTransform& world_from_model) const {
+    const View& view = scene_->views[index];
+    const Camera& camera = view.camera;
+    const PixelGrid region = scene_->projector->region(camera, world_from_model);
+    match::BlockSums found(match::Blocks::of(camera));
     if (region.count() == 0) return found;
     const double margin = std::ceil(4 * scene_->options.blur_px / step_) * step_;
-    const marrow::PixelGrid grid{region.u_px - margin, region.v_px - margin, double(step_),
-                                 int((region.columns + 2 * margin) / step_) + 1,
-                                 int((region.rows + 2 * margin) / step_) + 1};
+    const PixelGrid grid{region.u_px - margin, region.v_px - margin, double(step_),
+                         int((region.columns + 2 * margin) / step_) + 1, int((region.rows + 2 * margin) / step_) + 1};
     std::vector<float> values = scene_->projector->radiograph(camera, world_from_model, grid);
     cv::Mat radiograph(grid.rows, grid.columns, CV_32F, values.data());
     // The pixel step and Sobel's operator already smooth the radiograph.
@@ -140,8 +140,8 @@ class DrrEdges : public marrow::match::ViewsCost {
     if (const double blur = std::sqrt(std::max(blur2, 0.0)) / step_; blur > 0.2)
       cv::GaussianBlur(radiograph, radiograph, {}, blur);
     for (const DrawnEdge& edge : edges_of(radiograph, grid, scene_->options.threshold_percent)) {
-      if (!marrow::match::is_away_from_border(camera, edge.u, edge.v)) continue;
-      if (marrow::match::is_masked(view, edge.u, edge.v)) continue;
+      if (!match::is_away_from_border(camera, edge.u, edge.v)) continue;
+      if (match::is_masked(view, edge.u, edge.v)) continue;
       found.add(edge.u, edge.v, double(edge.weight) * loss_(distance2(index, edge)), double(edge.weight));
     }
     return found;
@@ -150,37 +150,34 @@ class DrrEdges : public marrow::match::ViewsCost {
   /// Squared distance to the nearest edge of similar direction. The distance along the edge counts only beyond the
   /// length that an edge pixel represents.
   double distance2(std::size_t view, const DrawnEdge& edge) const {
-    const marrow::EdgePixel* nearest = scene_->edges[view].find(edge.u, edge.v, edge.direction_u, edge.direction_v);
+    const EdgePixel* nearest = scene_->edges[view].find(edge.u, edge.v, edge.direction_u, edge.direction_v);
     if (!nearest) return 1e30;
     const auto [across, beyond] =
-        marrow::match::way_to_edge(nearest->u_px - edge.u, nearest->v_px - edge.v, edge.direction_u, edge.direction_v);
+        match::way_to_edge(nearest->u_px - edge.u, nearest->v_px - edge.v, edge.direction_u, edge.direction_v);
     return double(across * across + beyond * beyond);
   }
 
   std::shared_ptr<const Scene> scene_;
   const int step_;
   const double reach_px_;
-  const marrow::match::EdgeLoss loss_;
+  const match::EdgeLoss loss_;
 };
 
-std::shared_ptr<const marrow::Cost> drr_edges(const marrow::RadiographProjector& projector,
-                                              const marrow::List<marrow::View>& views,
-                                              const marrow::List<marrow::EdgeMap>& edges,
-                                              const marrow::OutlineProjector* outline,
-                                              const marrow::List<marrow::Pose>* others,
-                                              const marrow::List<marrow::OutlineProjector>* other_projectors,
-                                              const Options& options) {
-  marrow::match::check_edges(views, edges);
-  marrow::match::check_weights(options.weights, views.size());
-  const auto other = marrow::match::others_of(outline, others, other_projectors, "outline");
-  const marrow::List<marrow::EdgeMap> own = marrow::match::without_outlines(
-      views, edges, other, marrow::match::kOthersReach_px, options.direction_tolerance_deg);
+std::shared_ptr<const Cost> drr_edges(const RadiographProjector& projector, const List<View>& views,
+                                      const List<EdgeMap>& edges, const OutlineProjector* outline,
+                                      const List<Pose>* others, const List<OutlineProjector>* other_projectors,
+                                      const Options& options) {
+  match::check_edges(views, edges);
+  match::check_weights(options.weights, views.size());
+  const auto other = match::others_of(outline, others, other_projectors, "outline");
+  const List<EdgeMap> own =
+      match::without_outlines(views, edges, other, match::kOthersReach_px, options.direction_tolerance_deg);
   auto scene = std::make_shared<Scene>();
   scene->projector = &projector;
   scene->views = views;
   scene->options = options;
   for (std::size_t i = 0; i < views.size(); ++i)
-    scene->edges.emplace_back(own[i], views[i].mask, marrow::radians(options.direction_tolerance_deg));
+    scene->edges.emplace_back(own[i], views[i].mask, radians(options.direction_tolerance_deg));
   return std::make_shared<DrrEdges>(std::move(scene), options.pixel_step, options.reach_px);
 }
 
@@ -192,28 +189,27 @@ MARROW_PLUGIN(plugin) {
           "Mean distance from the edges of the radiograph (DRR) to the nearest edges of the image with similar "
           "direction; blur shifts both by the same distance")
       .in("projector", "makes radiographs of the model")
-      .in("views", "views with their cameras and masks", marrow::over("view"))
-      .in("edges", "edge pixels of each view", marrow::over("view"))
+      .in("views", "views with their cameras and masks", over("view"))
+      .in("edges", "edge pixels of each view", over("view"))
       .in("outline", "projector of this fragment's outline; it identifies this fragment in other_projectors")
-      .in("others", "poses of other fragments; edges of these fragments are left out", marrow::over("fragment"))
+      .in("others", "poses of other fragments; edges of these fragments are left out", over("fragment"))
       .in("other_projectors", "projectors of the other fragments' outlines; this fragment's own may be among them",
-          marrow::over("fragment"))
+          over("fragment"))
       .out("cost", "mean distance [px]")
-      .option("pixel_step", &Options::pixel_step, "the radiograph is computed at every n-th pixel", marrow::at_least(1),
-              marrow::at_most(16))
+      .option("pixel_step", &Options::pixel_step, "the radiograph is computed at every n-th pixel", at_least(1),
+              at_most(16))
       .option("blur_px", &Options::blur_px,
               "blur of the radiograph (standard deviation); should equal the blur of the edges by the X-ray device and "
               "the edge extractor",
-              marrow::at_least(0), marrow::at_most(10))
+              at_least(0), at_most(10))
       .option("threshold_percent", &Options::threshold_percent,
-              "least gradient of an edge, as a percentage of the radiograph's steepest gradient", marrow::at_least(0.1),
-              marrow::at_most(90), marrow::unit("%"))
+              "least gradient of an edge, as a percentage of the radiograph's steepest gradient", at_least(0.1),
+              at_most(90), unit("%"))
       .option("reach_px", &Options::reach_px,
               "an edge of the radiograph with no edge of the image within this distance counts as unmatched",
-              marrow::at_least(0.5))
-      .option("scale_px", &Options::scale_px, "distances below about this count by their squares",
-              marrow::at_least(0.01))
+              at_least(0.5))
+      .option("scale_px", &Options::scale_px, "distances below about this count by their squares", at_least(0.01))
       .option("direction_tolerance_deg", &Options::direction_tolerance_deg,
-              "largest angle between the directions of the edges", marrow::at_least(10), marrow::at_most(180))
+              "largest angle between the directions of the edges", at_least(10), at_most(180))
       .option("weights", &Options::weights, "weight of each view; empty: all views have the same weight");
 }

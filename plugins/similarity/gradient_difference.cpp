@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <cmath>
-#include <marrow/plugin.hpp>
 
 #include "marrow/similarity/structure.hpp"
 

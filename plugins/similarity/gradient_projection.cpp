@@ -7,9 +7,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "marrow/domain/quantile.hpp"
-#include "marrow/domain/same_place.hpp"
-#include "marrow/toolbox/image/grey_range.hpp"
-#include "marrow/toolbox/image/line_integrals.hpp"
+#include "marrow/toolbox/image/grey_values.hpp"
 #include "marrow/toolbox/match/views_cost.hpp"
 
 namespace {

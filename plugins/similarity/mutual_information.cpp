@@ -2,7 +2,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <marrow/plugin.hpp>
 
 #include "marrow/similarity/histogram.hpp"
 

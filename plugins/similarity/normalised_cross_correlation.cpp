@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <marrow/plugin.hpp>
-
 #include "marrow/similarity/intensity.hpp"
 
 namespace {

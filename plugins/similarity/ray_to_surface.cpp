@@ -7,13 +7,12 @@
 #include <algorithm>
 #include <cmath>
 
-#include "marrow/base/number_text.hpp"
-#include "marrow/domain/camera.hpp"
 #include "marrow/similarity/block_expansions.hpp"
-#include "marrow/toolbox/match/views_cost.hpp"
 #include "surface_distance.hpp"
 
 namespace {
+
+using namespace marrow;
 
 struct Options {
   double reach_mm = 4;
@@ -49,12 +48,12 @@ struct Touch {
   Eigen::Vector3d point, normal;  ///< both in the model's frame
 };
 
-class RayToSurface : public marrow::match::ViewsCost {
+class RayToSurface : public match::ViewsCost {
  public:
   struct Scene {
-    marrow::List<marrow::View> views;
+    List<View> views;
     std::vector<std::vector<Ray>> rays;
-    marrow::match::SurfaceDistance distance;
+    match::SurfaceDistance distance;
     Options options;
   };
   RayToSurface(std::shared_ptr<const Scene> scene, int step, double reach_mm)
@@ -63,26 +62,25 @@ class RayToSurface : public marrow::match::ViewsCost {
         step_(std::size_t(step)),
         loss_{std::min(reach_mm, double(scene_->distance.most_mm()))} {}
 
-  double value_in_view(std::size_t view, const marrow::RigidTransform& world_from_model) const override {
+  double value_in_view(std::size_t view, const RigidTransform& world_from_model) const override {
     return value_of(sums(view, world_from_model).all());
   }
 
   /// The derivative of the least distance along a ray. The shift of the touching point along the ray can be ignored,
   /// because it has no effect to first order. The change of `like` with the pose is neglected.
-  std::optional<Expansion> expansion(const marrow::RigidTransform& world_from_model,
-                                     const marrow::FragmentFrame& frame) const override {
+  std::optional<Expansion> expansion(const RigidTransform& world_from_model,
+                                     const FragmentFrame& frame) const override {
     Expansion about;
     double weights = 0;
-    for (std::size_t i = 0; i < scene_->views.size(); ++i)
-      weights += marrow::match::weight_of(scene_->options.weights, i);
+    for (std::size_t i = 0; i < scene_->views.size(); ++i) weights += match::weight_of(scene_->options.weights, i);
     for (std::size_t i = 0; i < scene_->views.size(); ++i) {
       const auto touches = touches_of(i, world_from_model);
-      const double share = marrow::match::weight_of(scene_->options.weights, i) / weights;
+      const double share = match::weight_of(scene_->options.weights, i) / weights;
       about.value += share * loss_.worst();
       for (const auto& touch : touches) {
         if (!touch) continue;
         const double one = share / double(touches.size()) * touch->like;
-        const marrow::Vector6d slope = slope_of(*touch, frame);
+        const Vector6d slope = slope_of(*touch, frame);
         const double weight = loss_.weight(touch->distance_mm);
         about.value += one * (loss_(touch->distance_mm) - loss_.worst());
         about.gradient += one * weight * touch->distance_mm * slope;
@@ -96,21 +94,20 @@ class RayToSurface : public marrow::match::ViewsCost {
   /// borders to opposite sides, so it hardly moves the pose, but each block alone shows it. Five blocks along an image,
   /// as for the contour. A single view gives no blocks: its least cost lies centimetres away from the bone along the
   /// rays.
-  std::vector<Expansion> expansion_without_each_block(const marrow::RigidTransform& world_from_model,
-                                                      const marrow::FragmentFrame& frame) const override {
+  std::vector<Expansion> expansion_without_each_block(const RigidTransform& world_from_model,
+                                                      const FragmentFrame& frame) const override {
     constexpr int kBlocksAlong = 5;
     if (scene_->views.size() < 2) return {};
     std::vector<std::vector<std::optional<Touch>>> views;
     std::vector<double> weights;
     for (std::size_t i = 0; i < scene_->views.size(); ++i) {
       views.push_back(touches_of(i, world_from_model));
-      weights.push_back(marrow::match::weight_of(scene_->options.weights, i));
+      weights.push_back(match::weight_of(scene_->options.weights, i));
     }
     const double common_mm = common_distance_mm(views, weights);
-    std::vector<marrow::match::BlockExpansions> of_views;
+    std::vector<match::BlockExpansions> of_views;
     for (std::size_t i = 0; i < views.size(); ++i) {
-      marrow::match::BlockExpansions& sums =
-          of_views.emplace_back(marrow::match::Blocks::of(scene_->views[i].camera, kBlocksAlong));
+      match::BlockExpansions& sums = of_views.emplace_back(match::Blocks::of(scene_->views[i].camera, kBlocksAlong));
       for (std::size_t k = 0; k < views[i].size(); ++k) {
         const Ray& ray = scene_->rays[i][k * step_];
         sums.count(ray.u_px, ray.v_px);
@@ -121,13 +118,13 @@ class RayToSurface : public marrow::match::ViewsCost {
                  touch->like * loss_.curvature(left_mm));
       }
     }
-    std::vector<Expansion> without = marrow::match::BlockExpansions::without_each(of_views, weights, 1, true);
+    std::vector<Expansion> without = match::BlockExpansions::without_each(of_views, weights, 1, true);
     // The pose has the least cost without this unknown, so what all blocks have in common is the cost's own slope.
     // Where noise hides some edges, a pull of the others remains, which the common distance hides. kMore covers this
     // pull, as measured (docs/results-trust.md, Deviations and noise).
     constexpr double kMore = 1.3;
-    const marrow::Vector6d whole = expansion(world_from_model, frame)->gradient;
-    marrow::Vector6d mean = marrow::Vector6d::Zero();
+    const Vector6d whole = expansion(world_from_model, frame)->gradient;
+    Vector6d mean = Vector6d::Zero();
     for (const Expansion& one : without) mean += one.gradient / double(without.size());
     for (Expansion& one : without) one.gradient = whole + kMore * (one.gradient - mean);
     return without;
@@ -135,30 +132,30 @@ class RayToSurface : public marrow::match::ViewsCost {
 
   /// Uses every n-th edge pixel, with n from the contour spacing. The reach is converted to mm where the views meet. If
   /// they do not meet, reach_mm is the reach of a usual level, and other levels have theirs in proportion.
-  std::shared_ptr<const marrow::Cost> at_level(const marrow::CostLevel& level) const override {
-    const std::optional<Eigen::Vector3d> bone_mm = marrow::meeting_point_mm(scene_->views);
+  std::shared_ptr<const Cost> at_level(const CostLevel& level) const override {
+    const std::optional<Eigen::Vector3d> bone_mm = meeting_point_mm(scene_->views);
     const double reach_mm = bone_mm ? level.reach_px * pixel_size_at_mm(scene_->views[0].camera, *bone_mm)
-                                    : level.reach_px / marrow::CostLevel().reach_px * scene_->options.reach_mm;
+                                    : level.reach_px / CostLevel().reach_px * scene_->options.reach_mm;
     return std::make_shared<RayToSurface>(scene_, std::max(1, int(std::lround(level.contour_spacing_px))), reach_mm);
   }
 
  private:
-  std::string silence(std::size_t view, const marrow::RigidTransform& world_from_model) const override {
-    return marrow::match::in_view(scene_->views, view, silence_of(view, world_from_model));
+  std::string silence(std::size_t view, const RigidTransform& world_from_model) const override {
+    return match::in_view(scene_->views, view, silence_of(view, world_from_model));
   }
-  std::string silence_of(std::size_t view, const marrow::RigidTransform& world_from_model) const {
+  std::string silence_of(std::size_t view, const RigidTransform& world_from_model) const {
     if (scene_->rays[view].empty()) return "it has no edge that is inside the mask and belongs to this bone";
     const auto touches = touches_of(view, world_from_model);
     if (std::any_of(touches.begin(), touches.end(), [](const auto& touch) { return touch.has_value(); })) return {};
-    return marrow::formatted("no ray through an edge passes within {:.3g} mm of the model's surface", loss_.reach);
+    return formatted("no ray through an edge passes within {:.3g} mm of the model's surface", loss_.reach);
   }
 
   /// How the distance changes with a small motion of the model: by (r, t) the ray moves relative to the model by
   /// -(r x (p - o) + t), in the fragment's axes.
-  static marrow::Vector6d slope_of(const Touch& touch, const marrow::FragmentFrame& frame) {
+  static Vector6d slope_of(const Touch& touch, const FragmentFrame& frame) {
     const Eigen::Vector3d normal = frame.axes.transpose() * touch.normal,
                           arm = frame.axes.transpose() * (touch.point - frame.origin_mm);
-    marrow::Vector6d slope;
+    Vector6d slope;
     slope << -arm.cross(normal), -normal;
     return slope;
   }
@@ -184,21 +181,21 @@ class RayToSurface : public marrow::match::ViewsCost {
     return common_mm;
   }
 
-  double value_of(const marrow::match::BlockSums::Sums& sums) const {
+  double value_of(const match::BlockSums::Sums& sums) const {
     return loss_.worst() + (sums.weights > 0 ? sums.values / sums.weights : 0);
   }
 
   /// No deviations are predicted from values: the distance that all edges have in common must be removed first.
-  std::vector<double> without_each_block(const marrow::RigidTransform&) const override { return {}; }
+  std::vector<double> without_each_block(const RigidTransform&) const override { return {}; }
 
-  Split split(std::size_t view, const marrow::RigidTransform& world_from_model) const override {
-    const marrow::match::BlockSums found = sums(view, world_from_model);
+  Split split(std::size_t view, const RigidTransform& world_from_model) const override {
+    const match::BlockSums found = sums(view, world_from_model);
     return {value_of(found.all()), found.without_each([&](const auto& left) { return value_of(left); })};
   }
 
   /// The loss of each ray, less the worst.
-  marrow::match::BlockSums sums(std::size_t view, const marrow::RigidTransform& world_from_model) const {
-    marrow::match::BlockSums found(marrow::match::Blocks::of(scene_->views[view].camera));
+  match::BlockSums sums(std::size_t view, const RigidTransform& world_from_model) const {
+    match::BlockSums found(match::Blocks::of(scene_->views[view].camera));
     const auto touches = touches_of(view, world_from_model);
     for (std::size_t i = 0; i < touches.size(); ++i) {
       const Ray& ray = scene_->rays[view][i * step_];
@@ -208,10 +205,10 @@ class RayToSurface : public marrow::match::ViewsCost {
     return found;
   }
 
-  std::vector<std::optional<Touch>> touches_of(std::size_t view, const marrow::RigidTransform& world_from_model) const {
+  std::vector<std::optional<Touch>> touches_of(std::size_t view, const RigidTransform& world_from_model) const {
     const std::vector<Ray>& rays = scene_->rays[view];
     std::vector<std::optional<Touch>> touches((rays.size() + step_ - 1) / step_);
-    const marrow::RigidTransform model_from_camera =
+    const RigidTransform model_from_camera =
         inverse(world_from_model) * inverse(scene_->views[view].camera.camera_from_world);
     const Eigen::Matrix3d line_from_normal =
         scene_->views[view].camera.intrinsics.inverse().transpose() * model_from_camera.rotation.transpose();
@@ -226,10 +223,10 @@ class RayToSurface : public marrow::match::ViewsCost {
   /// Of all local minima of the distance along the ray, the one that explains the edge best. A ray can have several,
   /// because X-ray images also show inner outlines: the ray touches the surface there and runs through the bone
   /// elsewhere. Nothing if the ray passes too far from the surface.
-  std::optional<Touch> touch_of(const Ray& ray, const marrow::RigidTransform& model_from_camera,
+  std::optional<Touch> touch_of(const Ray& ray, const RigidTransform& model_from_camera,
                                 const Eigen::Matrix3d& line_from_normal) const {
-    const marrow::match::SurfaceDistance& distance = scene_->distance;
-    const marrow::Grid& grid = distance.grid();
+    const match::SurfaceDistance& distance = scene_->distance;
+    const Grid& grid = distance.grid();
     const Eigen::Vector3d start = grid.index_from_point(model_from_camera.translation_mm);
     const Eigen::Vector3d along = model_from_camera.rotation * ray.direction;  // of length 1 mm
     const Eigen::Vector3d direction = (grid.direction.transpose() * along).cwiseQuotient(grid.spacing_mm);
@@ -275,7 +272,7 @@ class RayToSurface : public marrow::match::ViewsCost {
   double likeness(const Eigen::Vector3d& line, const Ray& ray) const {
     const double length = line.head<2>().norm();
     if (!(length > 0)) return 0;
-    const double least = std::cos(marrow::radians(scene_->options.direction_tolerance_deg));
+    const double least = std::cos(radians(scene_->options.direction_tolerance_deg));
     const double share =
         std::clamp((line.head<2>().dot(ray.towards_brighter) / length - least) / (0.5 * (1 - least)), 0.0, 1.0);
     return share * share * (3 - 2 * share);
@@ -286,10 +283,10 @@ class RayToSurface : public marrow::match::ViewsCost {
   const Loss loss_;
 };
 
-std::vector<Ray> rays_of(const marrow::View& view, const marrow::EdgeMap& edges) {
+std::vector<Ray> rays_of(const View& view, const EdgeMap& edges) {
   const Eigen::Matrix3d ray_from_pixel = view.camera.intrinsics.inverse();
   std::vector<Ray> rays;
-  for (const marrow::EdgePixel& edge : edges.pixels) {
+  for (const EdgePixel& edge : edges.pixels) {
     const int u = int(std::lround(edge.u_px)), v = int(std::lround(edge.v_px));
     const bool is_inside = u >= 0 && v >= 0 && u < edges.width_px && v < edges.height_px;
     if (!is_inside || (!view.mask.empty() && !view.mask.at<std::uint8_t>(v, u))) continue;
@@ -301,27 +298,23 @@ std::vector<Ray> rays_of(const marrow::View& view, const marrow::EdgeMap& edges)
   return rays;
 }
 
-std::shared_ptr<const marrow::Cost> ray_to_surface(const marrow::SignedField& field,
-                                                   const marrow::List<marrow::View>& views,
-                                                   const marrow::List<marrow::EdgeMap>& edges,
-                                                   const marrow::OutlineProjector* projector,
-                                                   const marrow::List<marrow::Pose>* others,
-                                                   const marrow::List<marrow::OutlineProjector>* other_projectors,
-                                                   const Options& options) {
-  marrow::match::check_edges(views, edges);
-  marrow::match::check_weights(options.weights, views.size());
+std::shared_ptr<const Cost> ray_to_surface(const SignedField& field, const List<View>& views,
+                                           const List<EdgeMap>& edges, const OutlineProjector* projector,
+                                           const List<Pose>* others, const List<OutlineProjector>* other_projectors,
+                                           const Options& options) {
+  match::check_edges(views, edges);
+  match::check_weights(options.weights, views.size());
   if (field.values_mm.size() != field.grid.count() ||
       *std::min_element(field.grid.size.begin(), field.grid.size.end()) < 2)
-    throw marrow::Error(
+    throw Error(
         "the field is empty or broken: it needs 2 x 2 x 2 voxels at least and a value for each; wire that of a "
         "segmented fragment");
   if (*std::min_element(field.values_mm.begin(), field.values_mm.end()) >= 0)
-    throw marrow::Error("the field has no inside, so no ray can touch its surface; check the segmentation");
-  const marrow::List<marrow::EdgeMap> own =
-      marrow::match::without_outlines(views, edges, marrow::match::others_of(projector, others, other_projectors),
-                                      marrow::match::kOthersReach_px, options.direction_tolerance_deg);
-  auto scene = std::make_shared<RayToSurface::Scene>(
-      RayToSurface::Scene{views, {}, marrow::match::SurfaceDistance(field), options});
+    throw Error("the field has no inside, so no ray can touch its surface; check the segmentation");
+  const List<EdgeMap> own = match::without_outlines(views, edges, match::others_of(projector, others, other_projectors),
+                                                    match::kOthersReach_px, options.direction_tolerance_deg);
+  auto scene =
+      std::make_shared<RayToSurface::Scene>(RayToSurface::Scene{views, {}, match::SurfaceDistance(field), options});
   for (std::size_t i = 0; i < views.size(); ++i) scene->rays.push_back(rays_of(views[i], own[i]));
   return std::make_shared<RayToSurface>(std::move(scene), options.ray_step, options.reach_mm);
 }
@@ -335,23 +328,21 @@ MARROW_PLUGIN(plugin) {
           "1995), with derivatives")
       .trait("derivatives")
       .in("field", "signed distance to the surface")
-      .in("views", "views with their cameras and masks", marrow::over("view"))
-      .in("edges", "edge pixels of each view", marrow::over("view"))
+      .in("views", "views with their cameras and masks", over("view"))
+      .in("edges", "edge pixels of each view", over("view"))
       .in("projector", "projector of this fragment's outline; it identifies this fragment in other_projectors")
-      .in("others", "poses of other fragments; edges of these fragments are left out", marrow::over("fragment"))
+      .in("others", "poses of other fragments; edges of these fragments are left out", over("fragment"))
       .in("other_projectors", "projectors of the other fragments' outlines; this fragment's own may be among them",
-          marrow::over("fragment"))
+          over("fragment"))
       .out("cost", "mean of Tukey's biweight of the distances [mm^2]")
-      .option(
-          "reach_mm", &Options::reach_mm,
-          "rays farther from the surface than this belong to something else; limited by the field's largest value. "
-          "In a search the level's reach_px counts, in mm where the views meet; with views that do not meet, such as "
-          "a single one, reach_mm is the reach at 8 px, and other levels have theirs in proportion",
-          marrow::at_least(0.1))
+      .option("reach_mm", &Options::reach_mm,
+              "rays farther from the surface than this belong to something else; limited by the field's largest value. "
+              "In a search the level's reach_px counts, in mm where the views meet; with views that do not meet, such "
+              "as a single one, reach_mm is the reach at 8 px, and other levels have theirs in proportion",
+              at_least(0.1))
       .option("direction_tolerance_deg", &Options::direction_tolerance_deg,
-              "largest angle between the directions of edge and surface", marrow::at_least(10), marrow::at_most(180))
+              "largest angle between the directions of edge and surface", at_least(10), at_most(180))
       .option("edge_offset_mm", &Options::edge_offset_mm, "distance of the edges outside the surface; negative: inside")
-      .option("ray_step", &Options::ray_step, "every n-th edge pixel is used", marrow::at_least(1),
-              marrow::at_most(100))
+      .option("ray_step", &Options::ray_step, "every n-th edge pixel is used", at_least(1), at_most(100))
       .option("weights", &Options::weights, "weight of each view; empty: all views have the same weight");
 }

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "scene.hpp"
 
-#include <Eigen/Geometry>
-
 #include "marrow/similarity/x_ray_view.hpp"
 
 namespace marrow::conformance {

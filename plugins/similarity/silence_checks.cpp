@@ -1,10 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <algorithm>
-
-#include "marrow/similarity/invisible.hpp"
-#include "marrow/toolbox/search/compared.hpp"
+#include "silence_checks.hpp"
+#include "marrow/similarity/x_ray_view.hpp"
+#include "marrow/toolbox/search/search.hpp"
 #include "scene.hpp"
-#include "suite.hpp"
 
 namespace marrow::conformance {
 namespace {

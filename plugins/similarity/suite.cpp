@@ -1,10 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // Checks for costs on two simulated views of a body with a known pose: three ellipsoids in soft tissue, with blur and
 // noise, and the edges of these images. Other inputs of a node (volume, field, surface, projector) show the same body.
-#include "suite.hpp"
-
 #include <oneapi/tbb/global_control.h>
 #include <oneapi/tbb/task_arena.h>
+#include <marrow/plugin.hpp>
 
 #include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
@@ -12,8 +11,8 @@
 #include <cmath>
 #include <random>
 
-#include "marrow/base/number_text.hpp"
 #include "scene.hpp"
+#include "silence_checks.hpp"
 
 namespace marrow::conformance {
 namespace {
@@ -289,8 +288,6 @@ std::vector<Trial> trials() {
            }}};
 }
 
-}  // namespace
-
 Suite similarity_suite() {
   Suite suite;
   suite.sample = [] { return inputs_of({}); };
@@ -323,4 +320,7 @@ Suite similarity_suite() {
   return suite;
 }
 
+}  // namespace
 }  // namespace marrow::conformance
+
+MARROW_PLUGIN(plugin) { plugin.suite("similarity", marrow::conformance::similarity_suite()); }

@@ -5,19 +5,77 @@
 #include <cmath>
 #include <marrow/base/names.hpp>
 #include <marrow/plugin.hpp>
+#include <memory>
 #include <numeric>
+#include <string>
+#include <vector>
 
-#include "contact.hpp"
 #include "cost_noise.hpp"
-#include "marrow/base/number_text.hpp"
-#include "marrow/toolbox/match/among_others.hpp"
+#include "marrow/toolbox/field/interior.hpp"
+#include "marrow/toolbox/match/bones_together.hpp"
 
 namespace {
 
 using namespace marrow;
-using similarity::Contact, similarity::Neighbour;
+using namespace similarity;
 
-struct Options : similarity::ContactOptions {
+/// See the help texts of similarity.with_contact.
+struct ContactOptions {
+  double penetration_deviation_mm = 0.2;
+  std::vector<std::string> joint;
+  double joint_width_mm = 0;
+  double joint_deviation_mm = 0.5;
+};
+
+/// Another bone: its signed field, which must outlive this, and where it is.
+struct Neighbour {
+  std::string name;
+  const SignedField* bone = nullptr;
+  RigidTransform world_from_bone;
+  bool is_joined = false;  ///< whether the gap to it is known
+};
+
+/// A bone's surface among its neighbours.
+class Contact {
+ public:
+  Contact(std::vector<Eigen::Vector3d> surface_mm, std::vector<Neighbour> neighbours, const ContactOptions& options)
+      : surface_mm_(std::make_shared<const std::vector<Eigen::Vector3d>>(std::move(surface_mm))),
+        neighbours_(std::move(neighbours)),
+        options_(options) {}
+
+  /// For each neighbour the penetration, and for a joined one the gap minus the joint's width, both in units of their
+  /// deviations. Half the sum of their squares is minus the logarithm of a normal density, without a constant.
+  std::vector<double> residuals(const RigidTransform& world_from_model) const;
+  /// The same with the neighbours in other poses; one that is not in the list stays where it is.
+  Contact with_others(const List<RigidTransform>& world_from_others) const;
+
+ private:
+  std::shared_ptr<const std::vector<Eigen::Vector3d>> surface_mm_;
+  std::vector<Neighbour> neighbours_;
+  ContactOptions options_;
+};
+
+std::vector<double> Contact::residuals(const RigidTransform& world_from_model) const {
+  std::vector<double> residuals;
+  for (const Neighbour& one : neighbours_) {
+    const RigidTransform bone_from_model = inverse(one.world_from_bone) * world_from_model;
+    residuals.push_back(field::penetration_mm(*surface_mm_, *one.bone, bone_from_model) /
+                        options_.penetration_deviation_mm);
+    if (one.is_joined)
+      residuals.push_back((field::gap_mm(*surface_mm_, *one.bone, bone_from_model) - options_.joint_width_mm) /
+                          options_.joint_deviation_mm);
+  }
+  return residuals;
+}
+
+Contact Contact::with_others(const List<RigidTransform>& world_from_others) const {
+  Contact contact = *this;
+  for (Neighbour& one : contact.neighbours_)
+    if (const RigidTransform* pose = world_from_others.find(one.name)) one.world_from_bone = *pose;
+  return contact;
+}
+
+struct Options : ContactOptions {
   double noise_times = 2;
 };
 
@@ -87,8 +145,8 @@ void check_reach(const Neighbour& one, double width_mm) {
   const double known_mm = double(*std::max_element(one.bone->values_mm.begin(), one.bone->values_mm.end()));
   if (known_mm <= width_mm)
     throw Error(
-        formatted("joint_width_mm is {:g}, but the field of '{}' knows distances up to {:g} mm only; raise "
-                  "band_mm of its segmentation",
+        formatted("joint_width_mm is {:g}, but the field of '{}' knows distances up to {:g} mm only; raise band_mm of "
+                  "its segmentation",
                   width_mm, one.name, known_mm));
 }
 

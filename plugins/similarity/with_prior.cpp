@@ -6,12 +6,11 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <marrow/domain/decompositions.hpp>
 #include <marrow/plugin.hpp>
 
 #include "cost_noise.hpp"
 #include "marrow/toolbox/geometry/rigid_fit.hpp"
-#include "marrow/toolbox/match/among_others.hpp"
+#include "marrow/toolbox/match/bones_together.hpp"
 
 namespace {
 
@@ -190,8 +189,8 @@ MARROW_PLUGIN(plugin) {
       .in("cost", "cost of the images alone")
       .in("prior", "pose known from elsewhere, with its covariance")
       .in("found",
-          "pose found by the same cost alone, with its covariance: how much the cost rises there within a "
-          "standard deviation says what the prior counts")
+          "pose found by the same cost alone, with its covariance: how much the cost rises there within a standard "
+          "deviation says what the prior counts")
       .trait("derivatives")
       .out("cost", "the cost, plus minus the logarithm of the prior's density in units of the cost's likelihood")
       .option("degrees_of_freedom", &Options::degrees_of_freedom,

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <marrow/plugin.hpp>
 
-#include "marrow/base/number_text.hpp"
 #include "marrow/domain/random.hpp"
 #include "marrow/toolbox/phantom/board_views.hpp"
 

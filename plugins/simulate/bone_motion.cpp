@@ -1,25 +1,20 @@
 // SPDX-License-Identifier: Apache-2.0
 // A bone that turns and shifts to and fro, frame by frame, for studies of following bones.
-#include <array>
-#include <cmath>
 #include <marrow/plugin.hpp>
 
 #include "marrow/simulate/posture.hpp"
-#include "marrow/toolbox/track/sequence.hpp"
+#include "marrow/toolbox/track/track_state.hpp"
 
 namespace {
 
 using namespace marrow;
-using phantom::Fragment;
-using phantom::Phantom;
-using phantom::Posture;
+using phantom::Fragment, phantom::Phantom, phantom::Posture;
 
 struct Options {
   int frames = 100;
   double frame_rate_hz = 250;
   double period_s = 0.8;
-  std::array<double, 3> rotation_deg{6, 4, 60};
-  std::array<double, 3> translation_mm{4, 3, 6};
+  std::array<double, 3> rotation_deg{6, 4, 60}, translation_mm{4, 3, 6};
 };
 
 List<Posture> bone_motion(const Phantom& phantom, const Options& options) {

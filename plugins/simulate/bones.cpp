@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 // Exact poses and seeds of the bones in a phantom: its fragments, and the bodies that are bones.
-#include <algorithm>
 #include <marrow/plugin.hpp>
 #include <sstream>
 
@@ -10,9 +9,7 @@
 namespace {
 
 using namespace marrow;
-using phantom::Body;
-using phantom::ClutteredPhantom;
-using phantom::Fragment;
+using phantom::Body, phantom::ClutteredPhantom, phantom::Fragment;
 
 struct Options {
   std::vector<std::string> bodies;

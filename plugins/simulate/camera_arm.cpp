@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 // A camera on a rotary arm, as it really is. Only simulations may know it.
-#include <marrow/plugin.hpp>
 
 #include "marrow/domain/random.hpp"
 #include "marrow/simulate/photograph.hpp"
@@ -12,12 +11,10 @@ using namespace marrow;
 struct Options {
   std::vector<std::string> names{"frontal", "lateral"};
   std::vector<double> angles_deg{0, 90};
-  int width_px = 640;
-  int height_px = 480;
+  int width_px = 640, height_px = 480;
   double focal_px = 800;
   Eigen::Vector2d principal_offset_px{6, -4};
-  double k1 = -0.12;
-  double k2 = 0.03;
+  double k1 = -0.12, k2 = 0.03;
   double distance_mm = 600;
   double angle_sd_deg = 0.2;
   double repeat_sd_deg = 0.05;

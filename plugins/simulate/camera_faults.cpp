@@ -1,10 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Views with the cameras that a calibration would state: off by errors of known size. The images stay as the true
 // cameras took them.
-#include <Eigen/Geometry>
-#include <algorithm>
-#include <array>
-#include <cmath>
 #include <marrow/plugin.hpp>
 
 #include "marrow/base/names.hpp"
@@ -35,9 +31,7 @@ List<View> camera_faults(const List<View>& views, const Options& options) {
   for (const std::string& name : options.only)
     if (!views.find(name)) throw Error("only: there is no view '" + name + "'; " + suggestion(name, views.names()));
   const double factor = factor_of(options.severity);
-  List<View> stated;
-  for (std::size_t i = 0; i < views.size(); ++i) {
-    View view = views[i];
+  return views.changed([&](View& view, std::size_t i) {
     Camera& camera = view.camera;
     const bool is_off = options.only.empty() || std::count(options.only.begin(), options.only.end(), views.name(i)) > 0;
     if (is_off && factor > 0) {
@@ -57,9 +51,7 @@ List<View> camera_faults(const List<View>& views, const Options& options) {
       camera.intrinsics(0, 2) += apart * std::cos(turn);
       camera.intrinsics(1, 2) += apart * std::sin(turn);
     }
-    stated.add(views.name(i), view);
-  }
-  return stated;
+  });
 }
 
 }  // namespace

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 // Combines a simulated CT and images with the seeds and the exact truth into a case.
-#include <algorithm>
 #include <marrow/plugin.hpp>
 
 #include "marrow/toolbox/phantom/phantom.hpp"
@@ -8,8 +7,7 @@
 namespace {
 
 using namespace marrow;
-using phantom::Fragment;
-using phantom::Phantom;
+using phantom::Fragment, phantom::Phantom;
 
 struct CaseOptions {
   std::vector<std::string> wanted{"distal"};

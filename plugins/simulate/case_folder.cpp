@@ -1,12 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // A simulated case whose fragments are given by seeds, by labels as another program would make them, or by surfaces.
-#include <Eigen/Geometry>
-#include <cmath>
 #include <marrow/plugin.hpp>
 
-#include "marrow/base/number_text.hpp"
-#include "marrow/toolbox/field/mesh_field.hpp"
-#include "marrow/toolbox/phantom/case_folder.hpp"
+#include "marrow/toolbox/field/interior.hpp"
+#include "marrow/toolbox/phantom/phantom.hpp"
 
 namespace {
 

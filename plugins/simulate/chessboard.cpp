@@ -1,12 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // Photographs of a chessboard: held before the camera in several ways, and at a known place from each stop of the arm.
-#include <Eigen/Geometry>
-#include <marrow/plugin.hpp>
 
-#include "marrow/base/number_text.hpp"
+#include "marrow/toolbox/calibration/chessboard.hpp"
 #include "marrow/domain/random.hpp"
 #include "marrow/simulate/photograph.hpp"
-#include "marrow/toolbox/calibration/chessboard.hpp"
 
 namespace {
 
@@ -20,8 +17,7 @@ struct Options : calibration::Chessboard, calibration::ChessboardPlace, phantom:
 };
 
 struct Result {
-  List<Picture> boards;
-  List<Picture> placed;
+  List<Picture> boards, placed;
 };
 
 /// Camera-from-board: the board's middle about the distance ahead, tilted to all sides in turn.

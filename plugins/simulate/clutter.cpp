@@ -1,48 +1,27 @@
 // SPDX-License-Identifier: Apache-2.0
 // Adds to a phantom what real images show beside the bone: the knee, soft tissue of uneven shape, metal, the table.
-#include <algorithm>
 #include <marrow/plugin.hpp>
-#include <optional>
 
-#include "marrow/domain/random.hpp"
 #include "marrow/simulate/knee.hpp"
 #include "marrow/simulate/surgery.hpp"
-#include "marrow/simulate/thigh.hpp"
 #include "marrow/simulate/vectors.hpp"
 
 namespace {
 
 using namespace marrow;
-using phantom::Body;
-using phantom::ClutteredPhantom;
-using phantom::Fragment;
-using phantom::Phantom;
+using phantom::Body, phantom::ClutteredPhantom, phantom::Fragment, phantom::Phantom;
 
 struct ClutterOptions {
-  std::string knee = "off";
-  std::string fat = "off";
-  std::string folds = "off";
-  std::string vessels = "off";
-  std::string pin = "off";
-  std::string plate = "off";
-  std::string cable = "off";
-  std::string clamp = "off";
-  std::string table = "off";
-  std::string lag = "off";
+  std::string knee = "off", fat = "off", folds = "off", vessels = "off", pin = "off", plate = "off", cable = "off",
+              clamp = "off", table = "off", lag = "off";
   int clutter_seed = 1;
 };
 
 // The figures of the levels mild, usual and bad (docs/simulation.md).
-constexpr std::array<double, 3> kKneeGapMm{5.5, 4.5, 2.5}, kKneeFlexionDeg{10, 20, 40};
-constexpr std::array<double, 3> kFatUnevenness{0.3, 0.55, 0.8};
-constexpr std::array<int, 3> kFolds{1, 2, 4};
-constexpr std::array<double, 3> kFoldMm{2, 4, 7};
-constexpr std::array<double, 3> kCalcified{0, 0.3, 0.7}, kCalcifiedWallMm{0.4, 0.6, 0.9};
-constexpr std::array<double, 3> kPlateLengthMm{50, 80, 110};
-constexpr std::array<int, 3> kCables{1, 2, 4};
-constexpr std::array<double, 3> kRodMm{8, 11, 16}, kClampMm{14, 26, 40};
-constexpr std::array<double, 3> kTableShellMm{1, 2, 2};
-constexpr std::array<double, 3> kLagMm{1, 3, 6};
+constexpr std::array<double, 3> kKneeGapMm{5.5, 4.5, 2.5}, kKneeFlexionDeg{10, 20, 40}, kFatUnevenness{0.3, 0.55, 0.8},
+    kFoldMm{2, 4, 7}, kCalcified{0, 0.3, 0.7}, kCalcifiedWallMm{0.4, 0.6, 0.9}, kPlateLengthMm{50, 80, 110},
+    kRodMm{8, 11, 16}, kClampMm{14, 26, 40}, kTableShellMm{1, 2, 2}, kLagMm{1, 3, 6};
+constexpr std::array<int, 3> kFolds{1, 2, 4}, kCables{1, 2, 4};
 
 /// 0, 1, 2 for mild, usual and bad; nothing for off.
 std::optional<std::size_t> level_of(const std::string& name) {

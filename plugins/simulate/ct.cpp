@@ -3,27 +3,17 @@
 // is added.
 #include <tbb/parallel_for.h>
 
-#include <Eigen/Geometry>
-#include <algorithm>
-#include <atomic>
-#include <cmath>
 #include <marrow/plugin.hpp>
 
 #include "ct_raster.hpp"
-#include "marrow/base/number_text.hpp"
 #include "marrow/domain/random.hpp"
 #include "marrow/simulate/solid.hpp"
 #include "marrow/simulate/streaks.hpp"
-#include "marrow/toolbox/phantom/materials.hpp"
 
 namespace {
 
 using namespace marrow;
-using phantom::ClutteredPhantom;
-using phantom::Interval;
-using phantom::Phantom;
-using phantom::Raster;
-using phantom::Rectangle;
+using phantom::ClutteredPhantom, phantom::Interval, phantom::Phantom, phantom::Raster, phantom::Rectangle;
 
 struct CtOptions {
   std::array<double, 3> spacing_mm{0.8, 0.8, 1.0};

@@ -1,8 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 // Images as a C-arm exports them: with lag, behind a collimator, saturated, of 8 bits with gamma and local contrast.
-#include <algorithm>
-#include <array>
-#include <cmath>
 #include <marrow/plugin.hpp>
 #include <opencv2/imgproc.hpp>
 

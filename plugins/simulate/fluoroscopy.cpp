@@ -4,31 +4,23 @@
 #include <tbb/parallel_for.h>
 
 #include <Eigen/LU>
-#include <algorithm>
-#include <cmath>
 #include <marrow/plugin.hpp>
 #include <opencv2/imgproc.hpp>
 #include <random>
 
-#include "marrow/base/number_text.hpp"
 #include "marrow/domain/random.hpp"
 #include "marrow/simulate/posture.hpp"
 #include "marrow/simulate/solid.hpp"
-#include "marrow/toolbox/phantom/materials.hpp"
 
 namespace {
 
 using namespace marrow;
-using phantom::ClutteredPhantom;
-using phantom::Interval;
-using phantom::Phantom;
-using phantom::Posture;
+using phantom::ClutteredPhantom, phantom::Interval, phantom::Phantom, phantom::Posture;
 
 struct FluoroscopyOptions {
   double photons = 2000;
   double blur_px = 0.8;
-  double scatter_to_primary = 0.5;
-  double scatter_px = 70;
+  double scatter_to_primary = 0.5, scatter_px = 70;
 };
 
 constexpr int kSubsamples = 2;         // rays per pixel in each direction

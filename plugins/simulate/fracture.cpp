@@ -1,22 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 // Breaks the shaft of a bone along an oblique, rough surface and moves the fragments by known rigid transforms.
-#include <Eigen/Geometry>
-#include <algorithm>
-#include <cmath>
 #include <marrow/plugin.hpp>
 
-#include "marrow/base/number_text.hpp"
-#include "marrow/domain/random.hpp"
 #include "marrow/simulate/solid.hpp"
 #include "marrow/simulate/vectors.hpp"
-#include "marrow/toolbox/phantom/phantom.hpp"
 
 namespace {
 
 using namespace marrow;
-using phantom::Bone;
-using phantom::Fragment;
-using phantom::Phantom;
+using phantom::Bone, phantom::Fragment, phantom::Phantom;
 
 struct FractureOptions {
   double height_fraction = 0.45;
@@ -25,10 +17,8 @@ struct FractureOptions {
   double roughness_mm = 0.8;
   int fracture_seed = 1;
   std::array<double, 3> ct_gap_mm{0, 0, -2};
-  std::array<double, 3> rotation_deg{0, 0, 0};
-  std::array<double, 3> translation_mm{0, 0, 0};
-  std::array<double, 3> proximal_rotation_deg{0, 0, 0};
-  std::array<double, 3> proximal_translation_mm{0, 0, 0};
+  std::array<double, 3> rotation_deg{0, 0, 0}, translation_mm{0, 0, 0};
+  std::array<double, 3> proximal_rotation_deg{0, 0, 0}, proximal_translation_mm{0, 0, 0};
 };
 
 constexpr double kRasterMm = 0.8;

@@ -1,13 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // A bone fragment on a hexapod (Stewart platform) that is told to move. Where the fragment really is depends on errors
 // of the legs, of the joints and of the mounting.
-#include <algorithm>
-#include <marrow/plugin.hpp>
 
-#include "marrow/base/number_text.hpp"
-#include "marrow/domain/random.hpp"
+#include "marrow/toolbox/robotics/hexapod.hpp"
+#include "marrow/simulate/vectors.hpp"
 #include "marrow/toolbox/phantom/phantom.hpp"
-#include "marrow/toolbox/robotics/hexapod_options.hpp"
 
 namespace {
 
@@ -22,22 +19,15 @@ struct Options : robot::HexapodShape, robot::HexapodLimits {
   Eigen::Vector3d stand_deg{2, -3, 25};
   double leg_sd_mm = 0.02;
   double joint_sd_mm = 0.05;
-  double mount_sd_deg = 2;
-  double mount_sd_mm = 2;
+  double mount_sd_deg = 2, mount_sd_mm = 2;
   int platform_seed = 1;
 };
 
 struct Result {
-  List<Truth> platform;
-  List<Truth> fragment;
+  List<Truth> platform, fragment;
   Pose start;
   List<Metrics> legs;
 };
-
-Eigen::Vector3d normal3(marrow::Random& random) {
-  const double x = random.normal(), y = random.normal(), z = random.normal();
-  return {x, y, z};
-}
 
 /// The fragment stands on the platform with its fracture downwards, its long axis along z. `grip_mm`: height of its
 /// lowest point.
@@ -72,9 +62,10 @@ RigidTransform misplaced(const RigidTransform& platform_from_ct, const Eigen::Ve
                          const Options& options, std::uint64_t seed) {
   marrow::Random random(seed, 0);
   const Eigen::Vector3d middle = platform_from_ct * middle_mm;
-  RigidTransform error{"platform", "platform", rotation_from_vector(radians(options.mount_sd_deg) * normal3(random)),
+  RigidTransform error{"platform", "platform",
+                       rotation_from_vector(radians(options.mount_sd_deg) * phantom::normal_vector(random)),
                        Eigen::Vector3d::Zero()};
-  error.translation_mm = middle - error.rotation * middle + options.mount_sd_mm * normal3(random);
+  error.translation_mm = middle - error.rotation * middle + options.mount_sd_mm * phantom::normal_vector(random);
   return error * platform_from_ct;
 }
 
@@ -132,8 +123,7 @@ MARROW_PLUGIN(plugin) {
       .out("start", &Result::start, "where the fragment would be with the platform at home, if nothing were off")
       .out("legs", &Result::legs,
            "length of each leg as the controller sets it, and the condition of the legs: how many times as far an "
-           "error of "
-           "them moves the platform in the worst direction as in the best one",
+           "error of them moves the platform in the worst direction as in the best one",
            over("position"))
       .figures({"leg1", "leg2", "leg3", "leg4", "leg5", "leg6", "condition"})
       .option("fragment", &Options::fragment, "name of the fragment on the platform");

@@ -2,9 +2,7 @@
 // Puts an implant of metal into a phantom, in an exactly known pose.
 #include <marrow/plugin.hpp>
 
-#include "marrow/domain/random.hpp"
 #include "marrow/simulate/vectors.hpp"
-#include "marrow/toolbox/phantom/materials.hpp"
 #include "marrow/toolbox/phantom/phantom.hpp"
 
 namespace {
@@ -15,10 +13,8 @@ using phantom::ClutteredPhantom;
 struct Options {
   std::string body = "implant";
   std::string material = "steel";
-  std::array<double, 3> rotation_deg{0, 0, 0};
-  std::array<double, 3> translation_mm{0, 0, 0};
-  double spread_deg = 0;
-  double spread_mm = 0;
+  std::array<double, 3> rotation_deg{0, 0, 0}, translation_mm{0, 0, 0};
+  double spread_deg = 0, spread_mm = 0;
   int pose_seed = 1;
 };
 

@@ -1,14 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // Parts of a knee implant as closed surfaces: a femoral part with two condyles and a flange, and a tibial tray with a
 // keel. x is to the patient's left, y to the back, z to the head. They have the sizes of real parts, but copy none.
-#include <Eigen/Core>
-#include <algorithm>
-#include <cmath>
 #include <marrow/plugin.hpp>
 
-#include "marrow/domain/random.hpp"
 #include "marrow/simulate/polygonise.hpp"
-#include "marrow/simulate/shape_functions.hpp"
 
 namespace {
 

@@ -1,22 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 // A knee that bends again and again: femur and lower leg frame by frame, for studies of following bones.
-#include <Eigen/Geometry>
-#include <algorithm>
-#include <cmath>
-#include <marrow/plugin.hpp>
 
 #include "marrow/simulate/knee.hpp"
 #include "marrow/simulate/photograph.hpp"
 #include "marrow/simulate/posture.hpp"
-#include "marrow/toolbox/track/sequence.hpp"
+#include "marrow/toolbox/track/track_state.hpp"
 
 namespace {
 
 using namespace marrow;
-using phantom::Body;
-using phantom::ClutteredPhantom;
-using phantom::Fragment;
-using phantom::Posture;
+using phantom::Body, phantom::ClutteredPhantom, phantom::Fragment, phantom::Posture;
 
 struct Options {
   int frames = 100;

@@ -4,14 +4,11 @@
 #include <tbb/parallel_for.h>
 
 #include <Eigen/LU>
-#include <algorithm>
 #include <marrow/plugin.hpp>
 
-#include "marrow/base/number_text.hpp"
 #include "marrow/simulate/collimator.hpp"
 #include "marrow/simulate/posture.hpp"
 #include "marrow/simulate/solid.hpp"
-#include "marrow/toolbox/phantom/materials.hpp"
 
 namespace {
 

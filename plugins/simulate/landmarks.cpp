@@ -1,10 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // Landmarks of a phantom's fragments as a person or a tracking system would find them. They have noise, so no method
 // sees the truth.
-#include <algorithm>
 #include <marrow/plugin.hpp>
 
-#include "marrow/base/number_text.hpp"
 #include "marrow/simulate/vectors.hpp"
 #include "marrow/toolbox/phantom/phantom.hpp"
 
@@ -15,8 +13,7 @@ using phantom::Fragment;
 
 struct Options {
   int count = 6;
-  double noise_px = 1;
-  double noise_mm = 0.3;
+  double noise_px = 1, noise_mm = 0.3;
 };
 
 bool is_seen(const Camera& camera, const Eigen::Vector3d& world_mm) {

@@ -1,12 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // A mistake that people make with the data of a registration. The registration then ends in a wrong pose, and a study
 // shows whether a verdict notices it.
-#include <Eigen/Geometry>
-#include <algorithm>
 #include <marrow/plugin.hpp>
-#include <opencv2/core.hpp>
 
-#include "marrow/base/number_text.hpp"
 #include "marrow/simulate/vectors.hpp"
 
 namespace {
@@ -15,8 +11,7 @@ using namespace marrow;
 
 struct Options {
   std::string mistake = "none";
-  double camera_deg = 8;
-  double camera_mm = 8;
+  double camera_deg = 8, camera_mm = 8;
   int mistake_seed = 1;
 };
 
@@ -30,13 +25,7 @@ struct Given {
 
 /// No pose is right for a bone that the images do not show. So its truth is one metre away.
 void set_far(List<Truth>& truth) {
-  List<Truth> far;
-  for (std::size_t i = 0; i < truth.size(); ++i) {
-    Truth one = truth[i];
-    one.world_from_model.translation_mm.x() += 1000;
-    far.add(truth.name(i), one);
-  }
-  truth = far;
+  truth = truth.changed([](Truth& one, std::size_t) { one.world_from_model.translation_mm.x() += 1000; });
 }
 
 /// Reverses the first axis of the CT, and moves the seeds accordingly.
@@ -47,40 +36,29 @@ void mirror_ct(Given& made) {
       float* const row = made.volume.values.data() + grid.offset(0, y, z);
       std::reverse(row, row + grid.size[0]);
     }
-  List<Seeds> seeds;
-  for (std::size_t i = 0; i < made.seeds.size(); ++i) {
-    Seeds mirrored = made.seeds[i];
-    for (Eigen::Vector3d& point : mirrored.points_mm) {
+  made.seeds = made.seeds.changed([&](Seeds& seeds, std::size_t) {
+    for (Eigen::Vector3d& point : seeds.points_mm) {
       Eigen::Vector3d index = grid.index_from_point(point);
       index.x() = grid.size[0] - 1 - index.x();
       point = grid.point_from_index(index);
     }
-    seeds.add(made.seeds.name(i), mirrored);
-  }
-  made.seeds = seeds;
+  });
 }
 
 void mirror_images(List<View>& views) {
-  List<View> mirrored;
-  for (std::size_t i = 0; i < views.size(); ++i) {
-    View view = views[i];
+  views = views.changed([&](View& view, std::size_t i) {
+    view.image.pixels = view.mask = cv::Mat();  // the given images stay as they are
     cv::flip(views[i].image.pixels, view.image.pixels, 1);
-    if (!view.mask.empty()) cv::flip(views[i].mask, view.mask, 1);
-    mirrored.add(views.name(i), view);
-  }
-  views = mirrored;
+    if (!views[i].mask.empty()) cv::flip(views[i].mask, view.mask, 1);
+  });
 }
 
 /// Exchanges the cameras of the first two views.
 void swap_images(List<View>& views) {
   if (views.size() < 2) throw Error(formatted("swapped_views needs two views, got {}", views.size()));
-  List<View> swapped;
-  for (std::size_t i = 0; i < views.size(); ++i) {
-    View view = views[i];
+  views = views.changed([&](View& view, std::size_t i) {
     if (i < 2) view.camera = views[1 - i].camera;
-    swapped.add(views.name(i), view);
-  }
-  views = swapped;
+  });
 }
 
 /// Gives the last view the camera of another pose of the C-arm.
@@ -89,13 +67,9 @@ void move_camera(List<View>& views, const Options& options) {
   RigidTransform off{"world", "world"};
   off.rotation = rotation_from_vector(radians(options.camera_deg) * phantom::random_direction(random));
   off.translation_mm = options.camera_mm * phantom::random_direction(random);
-  List<View> moved;
-  for (std::size_t i = 0; i < views.size(); ++i) {
-    View view = views[i];
+  views = views.changed([&](View& view, std::size_t i) {
     if (i + 1 == views.size()) view.camera.camera_from_world = view.camera.camera_from_world * off;
-    moved.add(views.name(i), view);
-  }
-  views = moved;
+  });
 }
 
 Given mistaken(const Volume& volume, const List<Seeds>& seeds, const List<View>& views, const List<Truth>* truth,

@@ -1,11 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // An intramedullary nail: a curved tube with holes for locking screws near its tip.
-#include <Eigen/Geometry>
-#include <cmath>
 #include <marrow/plugin.hpp>
-#include <tuple>
 
-#include "marrow/base/number_text.hpp"
 #include "marrow/simulate/polygonise.hpp"
 #include "marrow/toolbox/geometry/implant.hpp"
 
@@ -13,16 +9,14 @@ namespace {
 
 using namespace marrow;
 using Eigen::Vector3d;
-using geometry::Hole;
-using geometry::Implant;
+using geometry::Hole, geometry::Implant;
 
 struct NailOptions {
   double length_mm = 300;
   double diameter_mm = 10;
   double bore_mm = 4.8;
   double bow_radius_mm = 1200;
-  std::vector<double> hole_at_mm{15, 27.5, 40};
-  std::vector<double> hole_turn_deg{0, 90, 0};
+  std::vector<double> hole_at_mm{15, 27.5, 40}, hole_turn_deg{0, 90, 0};
   double hole_diameter_mm = 5;
   double resolution_mm = 0.6;
 };
@@ -79,10 +73,9 @@ std::tuple<Implant, Mesh> nail(const NailOptions& options) {
 MARROW_PLUGIN(plugin) {
   plugin.node("simulate.nail", nail)
       .summary("Makes an intramedullary nail: a curved tube with holes for locking screws")
-      .out(
-          "implant",
-          "closed surface and holes. z runs along the nail from its tip, at the origin; the bow is convex to the front "
-          "(-y)")
+      .out("implant",
+           "closed surface and holes. z runs along the nail from its tip, at the origin; the bow is convex to the "
+           "front (-y)")
       .out("mesh", "the surface alone")
       .option("length_mm", &NailOptions::length_mm, "length along the middle line", at_least(60), at_most(500))
       .option("diameter_mm", &NailOptions::diameter_mm, "outer diameter", at_least(4), at_most(20))

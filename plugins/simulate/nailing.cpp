@@ -1,32 +1,22 @@
 // SPDX-License-Identifier: Apache-2.0
 // Puts a nail into the marrow canal of a broken femur, as it lies after the reduction.
 #include <Eigen/Dense>
-#include <algorithm>
-#include <cmath>
-#include <limits>
 #include <marrow/plugin.hpp>
-#include <optional>
 
-#include "marrow/base/number_text.hpp"
 #include "marrow/simulate/vectors.hpp"
 #include "marrow/toolbox/geometry/implant.hpp"
-#include "marrow/toolbox/phantom/loft.hpp"
 #include "marrow/toolbox/phantom/phantom.hpp"
 
 namespace {
 
 using namespace marrow;
-using Eigen::Vector2d;
-using Eigen::Vector3d;
-using phantom::Body;
-using phantom::ClutteredPhantom;
-using phantom::Fragment;
+using Eigen::Vector2d, Eigen::Vector3d;
+using phantom::Body, phantom::ClutteredPhantom, phantom::Fragment;
 
 struct NailingOptions {
   std::string material = "titanium";
   double tip_from_distal_end_mm = 35;
-  double turn_deg = 10;
-  double shift_mm = 0.5;
+  double turn_deg = 10, shift_mm = 0.5;
   double reaming_mm = 1;
   double min_cortex_mm = 1;
   int nail_seed = 1;

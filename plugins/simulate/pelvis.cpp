@@ -1,27 +1,20 @@
 // SPDX-License-Identifier: Apache-2.0
 // A plain pelvis: wide, with wings, rings and two sockets, and nearly the same from the left and from the right.
-#include <Eigen/Geometry>
-#include <algorithm>
-#include <cmath>
 #include <marrow/plugin.hpp>
 
-#include "marrow/domain/random.hpp"
 #include "marrow/simulate/polygonise.hpp"
-#include "marrow/simulate/shape_functions.hpp"
 #include "marrow/toolbox/phantom/phantom.hpp"
 
 namespace {
 
 using namespace marrow;
 using Eigen::Vector3d;
-using phantom::Bone;
-using phantom::capsule, phantom::cut, phantom::ellipsoid, phantom::join;
+using phantom::Bone, phantom::capsule, phantom::cut, phantom::ellipsoid, phantom::join;
 
 struct PelvisOptions {
   int shape_seed = 1;
   double variation = 0;
-  double width_mm = 256;
-  double height_mm = 210;
+  double width_mm = 256, height_mm = 210;
   double depth_mm = 150;
   double socket_diameter_mm = 50;
   double shell_mm = 1.5;
@@ -105,8 +98,7 @@ MARROW_PLUGIN(plugin) {
   plugin.node("simulate.pelvis", pelvis)
       .summary(
           "Makes a plain pelvis of about the usual measures: wings, sockets, pubic and ischial rami, sacrum; the "
-          "middle "
-          "between the sockets is the isocentre")
+          "middle between the sockets is the isocentre")
       .out("bone", "bone with a closed outer and a closed inner surface")
       .option("width_mm", &PelvisOptions::width_mm, "greatest width, between the crests", at_least(200), at_most(340))
       .option("height_mm", &PelvisOptions::height_mm, "greatest height", at_least(160), at_most(270))

@@ -1,17 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 // Photographs of a plastic bone in its clamp on a platform, from each stop of a camera's arm.
-#include <algorithm>
-#include <marrow/plugin.hpp>
 
-#include "marrow/domain/random.hpp"
 #include "marrow/simulate/photograph.hpp"
+#include "marrow/domain/random.hpp"
 #include "marrow/toolbox/phantom/phantom.hpp"
 
 namespace {
 
 using namespace marrow;
-using phantom::Fragment;
-using phantom::Painted;
+using phantom::Fragment, phantom::Painted;
 
 struct Options : phantom::Sensor {
   std::string fragment = "distal";

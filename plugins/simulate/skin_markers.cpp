@@ -1,12 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // Markers on the skin around a limb, as a tracking system measures them. Skin slides over the bone: each marker moves
 // alone, and all of them move together. The common part does not average out.
-#include <Eigen/Geometry>
-#include <algorithm>
-#include <cmath>
 #include <marrow/plugin.hpp>
 
-#include "marrow/base/number_text.hpp"
 #include "marrow/simulate/vectors.hpp"
 #include "marrow/toolbox/phantom/phantom.hpp"
 
@@ -20,8 +16,7 @@ struct Options {
   double radius_mm = 85;
   double length_mm = 150;
   double noise_mm = 2;
-  double common_rotation_deg = 5;
-  double common_shift_mm = 5;
+  double common_rotation_deg = 5, common_shift_mm = 5;
   double false_rotation_deg = 0;
 };
 
@@ -78,8 +73,7 @@ MARROW_PLUGIN(plugin) {
   plugin.node("simulate.skin_markers", skin_markers)
       .summary(
           "Simulates tracked markers on the skin around each fragment of a phantom; the skin slides over the bone, "
-          "each "
-          "marker by itself, and all together")
+          "each marker by itself, and all together")
       .in("phantom", "fragments with their axes and exact poses")
       .out("landmarks",
            "places of the markers when the CT was made (mm, CT coordinates), and as they are tracked now (mm, world)",

@@ -1,16 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 // A bone from surfaces, for example the outer and the endosteal surface of a real femur in files.
-#include <Eigen/Geometry>
-#include <algorithm>
-#include <filesystem>
 #include <marrow/plugin.hpp>
 
-#include "marrow/base/number_text.hpp"
 #include "marrow/simulate/polygonise.hpp"
-#include "marrow/simulate/shape_functions.hpp"
 #include "marrow/simulate/vectors.hpp"
 #include "marrow/toolbox/exchange/surface_file.hpp"
-#include "marrow/toolbox/field/mesh_field.hpp"
+#include "marrow/toolbox/field/interior.hpp"
 #include "marrow/toolbox/phantom/phantom.hpp"
 
 namespace {
@@ -23,8 +18,7 @@ struct SurfaceOptions {
   std::filesystem::path inner;
   double scale = 1;
   std::array<double, 3> rotation_deg{0, 0, 0};
-  std::vector<double> fill_at{0, 0.06, 0.16, 0.24, 0.74, 0.84, 1};
-  std::vector<double> fill_fraction{0.30, 0.24, 0.15, 0, 0, 0.16, 0.30};
+  std::vector<double> fill_at{0, 0.06, 0.16, 0.24, 0.74, 0.84, 1}, fill_fraction{0.30, 0.24, 0.15, 0, 0, 0.16, 0.30};
   std::vector<double> cortex_mm;
   bool long_bone = true;
   double isocentre_from_distal_end_mm = 70;

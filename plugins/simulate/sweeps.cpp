@@ -1,9 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The commands to a robot in a study of accuracy: turns about one axis after another.
-#include <cmath>
 #include <marrow/plugin.hpp>
-
-#include "marrow/base/number_text.hpp"
 
 namespace {
 

@@ -1,23 +1,18 @@
 // SPDX-License-Identifier: Apache-2.0
 // An unbroken bone: one fragment, moved by a known rigid transform between CT and images.
-#include <algorithm>
 #include <cstdlib>
 #include <marrow/plugin.hpp>
 
 #include "marrow/simulate/solid.hpp"
 #include "marrow/simulate/vectors.hpp"
-#include "marrow/toolbox/phantom/phantom.hpp"
 
 namespace {
 
 using namespace marrow;
-using phantom::Bone;
-using phantom::Fragment;
-using phantom::Phantom;
+using phantom::Bone, phantom::Fragment, phantom::Phantom;
 
 struct WholeOptions {
-  std::array<double, 3> rotation_deg{0, 0, 0};
-  std::array<double, 3> translation_mm{0, 0, 0};
+  std::array<double, 3> rotation_deg{0, 0, 0}, translation_mm{0, 0, 0};
 };
 
 /// At several heights, the middle of the longest part of a line along x that lies in cortical bone. Only lines through

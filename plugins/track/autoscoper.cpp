@@ -3,7 +3,6 @@
 #include <marrow/plugin.hpp>
 
 #include "marrow/toolbox/files/atomic_write.hpp"
-#include "marrow/toolbox/track/autoscoper_frame.hpp"
 #include "marrow/toolbox/track/tra_file.hpp"
 
 namespace {

@@ -2,7 +2,7 @@
 // What is known of a bone before the first frame of a sequence.
 #include <marrow/plugin.hpp>
 
-#include "marrow/toolbox/geometry/start_axes.hpp"
+#include "marrow/toolbox/geometry/fragments.hpp"
 #include "marrow/toolbox/track/track_state.hpp"
 
 namespace {

@@ -3,7 +3,6 @@
 #include <cmath>
 #include <marrow/plugin.hpp>
 
-#include "marrow/base/number_text.hpp"
 #include "marrow/toolbox/track/motion_model.hpp"
 
 namespace {

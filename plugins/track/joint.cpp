@@ -6,7 +6,6 @@
 #include <cmath>
 #include <marrow/plugin.hpp>
 
-#include "marrow/base/number_text.hpp"
 #include "marrow/toolbox/track/track_state.hpp"
 
 namespace {

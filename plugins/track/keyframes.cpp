@@ -4,9 +4,7 @@
 #include <map>
 #include <marrow/plugin.hpp>
 
-#include "marrow/base/number_text.hpp"
-#include "marrow/toolbox/files/escaped_name.hpp"
-#include "marrow/toolbox/track/sequence.hpp"
+#include "marrow/toolbox/files/input_file.hpp"
 #include "marrow/toolbox/track/tra_file.hpp"
 
 namespace {

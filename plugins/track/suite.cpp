@@ -3,16 +3,12 @@
 // with noise of a known deviation. A node that gives a pose for each frame must know the bone no worse than the
 // measurements do. It takes the measured poses themselves, or the states of a filter that saw them, or it is such a
 // filter.
-#include "suite.hpp"
-
 #include <algorithm>
 #include <cmath>
+#include <marrow/plugin.hpp>
 
-#include "marrow/base/number_text.hpp"
 #include "marrow/domain/random.hpp"
-#include "marrow/runtime/node/types.hpp"
 #include "marrow/toolbox/track/motion_model.hpp"
-#include "marrow/toolbox/track/sequence.hpp"
 
 namespace marrow::conformance {
 namespace {
@@ -309,8 +305,6 @@ std::vector<Trial> trials() {
           {"no_deviations", with_pose([](Pose& pose) { pose.covariance.reset(); })}};
 }
 
-}  // namespace
-
 Suite track_suite() {
   Suite suite{sample, validate, trials(), {}};
   const std::string of = "40 frames, noise of 0.4 degrees and mm: ";
@@ -327,4 +321,7 @@ Suite track_suite() {
   return suite;
 }
 
+}  // namespace
 }  // namespace marrow::conformance
+
+MARROW_PLUGIN(plugin) { plugin.suite("track", marrow::conformance::track_suite()); }

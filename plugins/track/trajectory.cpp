@@ -2,7 +2,6 @@
 // The way of a bone as one value, and as a table (CSV) that other programs read.
 #include <marrow/plugin.hpp>
 
-#include "marrow/base/number_text.hpp"
 #include "marrow/toolbox/files/atomic_write.hpp"
 #include "marrow/toolbox/track/track_state.hpp"
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <marrow/plugin.hpp>
 
-#include "marrow/toolbox/track/sequence.hpp"
+#include "marrow/toolbox/track/track_state.hpp"
 
 namespace {
 

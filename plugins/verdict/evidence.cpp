@@ -7,19 +7,106 @@
 
 #include <algorithm>
 #include <cmath>
-#include <marrow/plugin.hpp>
+#include <filesystem>
+#include <string>
+#include <vector>
 
-#include "failure_model.hpp"
 #include "judged.hpp"
-#include "marrow/base/number_text.hpp"
-#include "marrow/toolbox/geometry/targets.hpp"
-#include "marrow/toolbox/search/compared.hpp"
+#include "marrow/toolbox/files/yaml_values.hpp"
+#include "marrow/toolbox/search/search.hpp"
 #include "marrow/verdict/spread.hpp"
 
 namespace {
 
 using namespace marrow;
-using verdict::Evidence, verdict::FailureModel, verdict::Judged;
+using namespace verdict;
+
+// The probability that a pose is off, from figures that speak for or against it.
+
+/// A logistic regression on the figures' logarithms: log odds = bias + sum of weight * log(1 + figure / scale). No
+/// weight is negative, so a larger figure never makes a pose more likely to be right.
+struct FailureModel {
+  struct Term {
+    std::string figure;
+    double scale = 1, weight = 0;
+    double absent = 0;  ///< the figure's value where a registration does not give it
+  };
+  double bias = 0, doubtful_above = 0, wrong_above = 0.5;
+  std::vector<Term> terms;
+
+  /// How much a figure adds to the log odds.
+  struct Contribution {
+    const Term* term;
+    const Metric* figure;  ///< null if it is absent
+    double log_odds = 0;
+  };
+  std::vector<Contribution> contributions(const Evidence& evidence) const;
+  double probability(const std::vector<Contribution>& contributions) const;
+};
+
+using files::YamlFile, files::YamlMap;
+
+/// A number that must lie in a range; a value outside is a fault.
+double number_within(const YamlMap& map, const std::string& key, double least, double most) {
+  const auto value = map.number(key);
+  if (!value) return least;
+  if (!(*value >= least && *value <= most)) {
+    const std::string text = formatted(": expected a number from {:g} to {:g}, got {:g}", least, most, *value);
+    map.fault(key, key + text);
+  }
+  return *value;
+}
+
+FailureModel::Term term_from(YamlFile& file, const YAML::Node& node, std::size_t number) {
+  const YamlMap map(file, node, formatted("term {}", number), {"figure", "scale", "weight", "absent"});
+  FailureModel::Term term;
+  term.figure = map.text("figure").value_or("");
+  term.scale = number_within(map, "scale", 1e-6, 1e6);
+  term.weight = number_within(map, "weight", 0, 1e6);
+  term.absent = number_within(map, "absent", 0, 1e6);
+  return term;
+}
+
+std::vector<FailureModel::Contribution> FailureModel::contributions(const Evidence& evidence) const {
+  std::vector<Contribution> all;
+  for (const Term& term : terms) {
+    const auto found =
+        std::find_if(evidence.begin(), evidence.end(), [&](const Metric& one) { return one.name == term.figure; });
+    const Metric* const figure = found == evidence.end() ? nullptr : &*found;
+    const double value = figure ? figure->value : term.absent;
+    all.push_back({&term, figure, term.weight * std::log1p(std::max(0.0, value) / term.scale)});
+  }
+  return all;
+}
+
+double FailureModel::probability(const std::vector<Contribution>& contributions) const {
+  double log_odds = bias;
+  for (const Contribution& one : contributions) log_odds += one.log_odds;
+  return 1 / (1 + std::exp(-log_odds));
+}
+
+/// Reads a file of tools/studies/fit_verdict. Throws Error with all of its faults.
+FailureModel read_failure_model(const std::filesystem::path& path) {
+  YamlFile file(path);
+  const YamlMap map(file, file.root(), "failure model",
+                    {"marrow-failure-model", "record", "bias", "doubtful_above", "wrong_above", "terms"});
+  check_version(map, "marrow-failure-model");
+  FailureModel model;
+  map.text("record");
+  model.bias = number_within(map, "bias", -1e6, 1e6);
+  model.doubtful_above = number_within(map, "doubtful_above", 0, 1);
+  model.wrong_above = number_within(map, "wrong_above", 0, 1);
+  if (model.doubtful_above > model.wrong_above)
+    map.fault("doubtful_above", "doubtful_above: expected at most wrong_above");
+  if (const auto list = map.required("terms")) {
+    if (!list->IsSequence() || list->size() == 0)
+      map.fault("terms", "terms: expected a list of terms, each with figure, scale, weight and absent");
+    else
+      for (const auto& item : *list) model.terms.push_back(term_from(file, item, model.terms.size() + 1));
+  }
+  file.finish();
+  return model;
+}
 
 struct Options {
   std::filesystem::path failure_model;
@@ -226,7 +313,7 @@ Verdict judge(const Pose& pose, const Pose* contour_pose, const List<Pose>* stag
   const std::filesystem::path& file = grey_cost ? options.failure_model : options.contour_failure_model;
   FailureModel model;
   if (!file.empty()) {
-    model = verdict::read_failure_model(file);
+    model = read_failure_model(file);
     check_figures(model, file);
   }
   Judged judged{pose, fragment_frame(mesh), geometry::targets_mm(pose.world_from_model, &mesh, nullptr, kTargets),

@@ -2,8 +2,6 @@
 // The kind of nodes that say whether a pose can be relied on. They never see the truth.
 #include <marrow/plugin.hpp>
 
-#include "suite.hpp"
-
 MARROW_PLUGIN(plugin) {
   plugin.kind("verdict")
       .summary("whether a pose can be relied on: trusted, doubtful or wrong, with reasons")
@@ -20,6 +18,5 @@ MARROW_PLUGIN(plugin) {
       .in<marrow::Pose>("others", "poses of other fragments", marrow::over("fragment"))
       .in<marrow::Pose>("other", "another pose of the same bone, with its cost")
       .in<marrow::SignedField>("other_bones", "the other fragments' bone", marrow::over("fragment"))
-      .out<marrow::Verdict>("verdict", "judgement of the pose, with the probability that it is off")
-      .suite(marrow::conformance::verdict_suite());
+      .out<marrow::Verdict>("verdict", "judgement of the pose, with the probability that it is off");
 }

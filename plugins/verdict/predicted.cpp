@@ -2,13 +2,10 @@
 // Judges a pose by what its registration says about it: the predicted covariance and the warnings. It draws errors from
 // the normal distribution with this covariance, and counts those that are off.
 #include <algorithm>
-#include <marrow/plugin.hpp>
 #include <optional>
 #include <string>
 
 #include "marrow/verdict/spread.hpp"
-
-#include "marrow/base/number_text.hpp"
 
 namespace {
 
@@ -129,10 +126,9 @@ void judge_by_other(const marrow::Pose& pose, const marrow::Pose& other, const O
   verdict.figures.push_back({"other_cost_times", times, ""});
   if (apart_deg < kSame_deg || times >= options.clear_times) return;
   verdict.judgement = std::max(verdict.judgement, Judgement::doubtful);
-  verdict.reasons.insert(verdict.reasons.begin(),
-                         formatted("another pose, {:.1f} degrees away, explains the images nearly as well: its cost is "
-                                   "{:.2f} times that of this one",
-                                   apart_deg, times));
+  verdict.reasons.insert(verdict.reasons.begin(), formatted("another pose, {:.1f} degrees away, explains the images "
+                                                            "nearly as well: its cost is {:.2f} times that of this one",
+                                                            apart_deg, times));
   verdict.remedies.emplace_back(
       "another view, or a look at both overlays: which of the two can be, beside the other bones and parts?");
 }

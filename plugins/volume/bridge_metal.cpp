@@ -3,19 +3,13 @@
 // as a screw across a bone. The rest of the bone's border there misleads every segmentation. A screw is seen in few
 // slices, over which a bone hardly changes. So these slices are interpolated from their neighbours. Slices that only a
 // plate crosses are kept.
-#include <Eigen/Geometry>
-#include <algorithm>
-#include <cmath>
 #include <marrow/plugin.hpp>
 
-#include "marrow/base/number_text.hpp"
 #include "marrow/domain/quantile.hpp"
 
 namespace {
 
-using marrow::Context;
-using marrow::Grid;
-using marrow::Volume;
+using marrow::Context, marrow::Grid, marrow::Volume;
 
 struct Options {
   double metal_hu = 2500;

@@ -3,18 +3,13 @@
 // radiographs of a CT draws the implant, too.
 #include <tbb/parallel_for.h>
 
-#include <Eigen/Geometry>
-#include <algorithm>
-#include <cmath>
 #include <marrow/plugin.hpp>
 
-#include "marrow/base/number_text.hpp"
-#include "marrow/toolbox/field/mesh_field.hpp"
+#include "marrow/toolbox/field/interior.hpp"
 
 namespace {
 
-using marrow::Grid;
-using marrow::Volume;
+using marrow::Grid, marrow::Volume;
 
 struct Options {
   double spacing_mm = 0.5;

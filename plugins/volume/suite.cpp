@@ -1,18 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 // Checks for volumes. A CT of a bone in soft tissue must stay what it is: the same grid, and the same Hounsfield units
 // inside and outside, however its grid lies. A surface must become a volume of its own size, at its own place.
-#include "suite.hpp"
+#include <marrow/plugin.hpp>
 
-#include <Eigen/Geometry>
-#include <algorithm>
-#include <cmath>
-
-#include "marrow/base/number_text.hpp"
-#include "marrow/runtime/node/types.hpp"
 #include "marrow/toolbox/analytic/body.hpp"
 
-namespace marrow::conformance {
 namespace {
+
+using namespace marrow;
+using namespace marrow::conformance;
 
 constexpr double kBone_hu = 1200, kTissue_hu = 40, kMetal_hu = 4000;
 
@@ -212,15 +208,13 @@ std::vector<Trial> trials() {
           {"far_vertex", with_mesh([](Mesh& mesh) { mesh.vertices_mm[0].x() = 1e9; })}};
 }
 
-}  // namespace
-
-Suite volume_suite() {
+Suite suite_of_kind() {
   Suite suite{sample, validate, trials(), {}};
   for (const Place& place : places()) {
     const auto add = [&](const std::string& name, const std::string& what, double limit, const std::string& unit,
                          const std::function<double(const Subject&, const Place&)>& measure) {
-      suite.accuracy.push_back({{place.prefix + name, "bone in soft tissue, " + place.text + ": " + what, limit, unit},
-                                [=](const Subject& subject) { return measure(subject, place); }});
+      suite.add(place.prefix + name, "bone in soft tissue, " + place.text + ": " + what, limit, unit,
+                [=](const Subject& subject) { return measure(subject, place); });
     };
     add("inside", "mean change of the bone, 2 mm and more inside", 25, "HU",
         [](const Subject& subject, const Place& at) { return change_hu(subject, at, true); });
@@ -228,16 +222,18 @@ Suite volume_suite() {
         [](const Subject& subject, const Place& at) { return change_hu(subject, at, false); });
     add("size", "how far the size of the bone is off", 2, "%", size_off_percent);
   }
-  suite.accuracy.push_back({{"metal", "voxels of a screw across a bone that are left", 0, "voxels"}, metal_left});
+  suite.add("metal", "voxels of a screw across a bone that are left", 0, "voxels", metal_left);
   const std::tuple<std::string, double, Eigen::Vector3d> surfaces[] = {
       {"", 0, {0, 0, 0}}, {"turned_", 0.7, {0, 0, 0}}, {"moved_", 0.7, {150, -80, 40}}};
   for (const auto& [prefix, angle_rad, at_mm] : surfaces) {
-    suite.accuracy.push_back({{prefix + "surface_volume", "how far the volume of a closed surface is off", 1, "%"},
-                              [a = angle_rad, at = at_mm](const Subject& s) { return filled_off_percent(s, a, at); }});
-    suite.accuracy.push_back({{prefix + "surface_place", "from its middle to that of the surface", 0.05, "mm"},
-                              [a = angle_rad, at = at_mm](const Subject& s) { return filled_off_mm(s, a, at); }});
+    suite.add(prefix + "surface_volume", "how far the volume of a closed surface is off", 1, "%",
+              [a = angle_rad, at = at_mm](const Subject& s) { return filled_off_percent(s, a, at); });
+    suite.add(prefix + "surface_place", "from its middle to that of the surface", 0.05, "mm",
+              [a = angle_rad, at = at_mm](const Subject& s) { return filled_off_mm(s, a, at); });
   }
   return suite;
 }
 
-}  // namespace marrow::conformance
+}  // namespace
+
+MARROW_PLUGIN(plugin) { plugin.suite("volume", suite_of_kind()); }

@@ -7,12 +7,11 @@
 #include <marrow/base/printable.hpp>
 #include <marrow/plugin.hpp>
 
-#include "marrow/base/number_text.hpp"
 #include "marrow/toolbox/exchange/surface_file.hpp"
 #include "marrow/toolbox/files/atomic_write.hpp"
 #include "marrow/toolbox/files/header_lines.hpp"
 #include "marrow/toolbox/files/yaml_text.hpp"
-#include "marrow/toolbox/phantom/case_folder.hpp"
+#include "marrow/toolbox/phantom/phantom.hpp"
 #include "marrow/write/picture_out.hpp"
 
 namespace {

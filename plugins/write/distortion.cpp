@@ -2,11 +2,8 @@
 // Writes a distortion and the points from which it was measured.
 #include <marrow/plugin.hpp>
 
-#include "marrow/base/number_text.hpp"
-#include "marrow/toolbox/distortion/distortion.hpp"
-#include "marrow/toolbox/distortion/plate_points.hpp"
 #include "marrow/toolbox/files/atomic_write.hpp"
-#include "marrow/toolbox/files/distortion_file.hpp"
+#include "marrow/toolbox/files/camera_file.hpp"
 #include "marrow/toolbox/files/yaml_text.hpp"
 
 namespace {

@@ -1,22 +1,18 @@
 // SPDX-License-Identifier: Apache-2.0
 // Writes implants, to be read by read.implant, and plans for a drill.
+#include "marrow/toolbox/geometry/implant.hpp"
+#include <Eigen/Geometry>
 #include <bit>
 #include <cmath>
 #include <cstring>
 #include <marrow/plugin.hpp>
-
-#include <Eigen/Geometry>
-#include "marrow/toolbox/files/atomic_write.hpp"
 #include "marrow/toolbox/files/yaml_text.hpp"
-#include "marrow/toolbox/geometry/implant.hpp"
-#include "marrow/toolbox/geometry/locking_plan.hpp"
 #include "marrow/write/json_out.hpp"
 
 namespace {
 
 namespace fs = std::filesystem;
-using marrow::geometry::Implant;
-using marrow::geometry::LockingPlan;
+using marrow::geometry::Implant, marrow::geometry::LockingPlan;
 using YAML::BeginMap, YAML::EndMap, YAML::Key, YAML::Value;
 
 static_assert(std::endian::native == std::endian::little, "the numbers of an STL file are little-endian");

@@ -3,9 +3,7 @@
 #include <algorithm>
 #include <marrow/plugin.hpp>
 
-#include "marrow/base/number_text.hpp"
-#include "marrow/toolbox/exchange/jointtrack_camera.hpp"
-#include "marrow/toolbox/exchange/jointtrack_poses.hpp"
+#include "marrow/toolbox/exchange/jointtrack.hpp"
 #include "marrow/toolbox/exchange/written_files.hpp"
 
 namespace {

@@ -2,7 +2,7 @@
 // Points for 3D Slicer, as .mrk.json. Coordinates are LPS, and the file says so.
 #include <marrow/plugin.hpp>
 
-#include "marrow/toolbox/exchange/marked_values.hpp"
+#include "marrow/toolbox/exchange/markups.hpp"
 #include "marrow/toolbox/exchange/written_files.hpp"
 
 namespace {

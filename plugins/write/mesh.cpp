@@ -3,7 +3,6 @@
 #include <cstring>
 #include <marrow/plugin.hpp>
 
-#include "marrow/base/number_text.hpp"
 #include "marrow/toolbox/files/atomic_write.hpp"
 
 namespace {

@@ -2,7 +2,7 @@
 // A camera as plastimatch's projection matrix.
 #include <marrow/plugin.hpp>
 
-#include "marrow/toolbox/exchange/plastimatch_camera.hpp"
+#include "marrow/toolbox/exchange/cameras.hpp"
 #include "marrow/toolbox/exchange/written_files.hpp"
 
 namespace {

@@ -3,7 +3,7 @@
 #include <bit>
 #include <cmath>
 #include <cstring>
-#include <marrow/base/base64.hpp>
+#include <marrow/base/plain_text.hpp>
 #include <marrow/plugin.hpp>
 
 #include "marrow/toolbox/files/samples_out.hpp"

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Writes what a robot and its guide know, as JSON.
-#include <marrow/plugin.hpp>
 
-#include "marrow/toolbox/robotics/guide_state.hpp"
 #include "marrow/toolbox/robotics/robot_state.hpp"
 #include "marrow/write/json_out.hpp"
 

@@ -2,7 +2,7 @@
 #include <filesystem>
 #include <marrow/plugin.hpp>
 
-#include "marrow/toolbox/files/escaped_name.hpp"
+#include "marrow/toolbox/files/input_file.hpp"
 #include "marrow/toolbox/files/yaml_text.hpp"
 #include "marrow/write/json_out.hpp"
 

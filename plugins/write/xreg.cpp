@@ -2,7 +2,6 @@
 // Cameras, and landmarks seen in views, as xReg's projection data in HDF5. The camera frame is the one whose images are
 // not turned over. The images themselves are left out.
 #include <algorithm>
-#include <marrow/domain/landmarks.hpp>
 #include <marrow/plugin.hpp>
 
 #include "marrow/toolbox/exchange/written_files.hpp"

@@ -1,10 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "arrays.hpp"
+#include "values.hpp"
 
 #include <algorithm>
 #include <cstring>
 
-#include "marrow/base/error.hpp"
 #include "marrow/base/number_text.hpp"
 
 namespace marrow::python {

@@ -3,10 +3,7 @@
 
 #include <mutex>
 
-#include "marrow/base/error.hpp"
 #include "marrow/base/framework_file.hpp"
-#include "marrow/base/names.hpp"
-#include "marrow/runtime/plugins/library.hpp"
 #include "pipelines.hpp"
 
 namespace marrow::python {

@@ -1,9 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Values in files and in bytes: single values are written as a run writes them, and packed as the store packs them.
-#include "marrow/base/error.hpp"
 #include "marrow/base/process_state.hpp"
-#include "marrow/base/reason_of_exception.hpp"
-#include "marrow/runtime/pipeline/pipeline.hpp"
 #include "pipelines.hpp"
 #include "values.hpp"
 

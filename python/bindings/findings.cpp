@@ -5,7 +5,6 @@
 #include <cmath>
 #include <optional>
 
-#include "marrow/base/error.hpp"
 #include "marrow/base/number_text.hpp"
 #include "values.hpp"
 

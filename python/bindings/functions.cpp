@@ -1,15 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 // Functions that nodes make, as things that Python can call. All of them run without Python's lock.
-#include "marrow/domain/functions.hpp"
 
 #include <pybind11/stl.h>
 
 #include <algorithm>
 #include <cmath>
 
-#include "interruptible.hpp"
-#include "marrow/base/error.hpp"
 #include "marrow/base/number_text.hpp"
+#include "pipelines.hpp"
 #include "values.hpp"
 
 namespace marrow::python {

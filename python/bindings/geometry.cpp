@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <pybind11/stl.h>
 
-#include "marrow/base/error.hpp"
 #include "marrow/base/number_text.hpp"
 #include "values.hpp"
 

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <pybind11/stl.h>
+#include <map>
+#include <mutex>
 
-#include "mapped.hpp"
-#include "marrow/base/error.hpp"
 #include "marrow/base/number_text.hpp"
 #include "values.hpp"
 
@@ -80,6 +80,16 @@ void bind_grid(py::class_<T, std::shared_ptr<T>>& made, std::vector<float> T::*v
           "frame", [](const T& self) { return self.grid.frame; }, "The name of the frame.");
 }
 
+struct Mapped {
+  std::mutex mutex;
+  std::map<const void*, const float*> samples;
+};
+
+Mapped& mapped() {
+  static auto* const all = new Mapped;  // outlives every Python object
+  return *all;
+}
+
 }  // namespace
 
 std::string text_of(const Image& image) {
@@ -142,6 +152,28 @@ void bind_images(py::module_& module) {
            py::arg("direction") = py::none(), py::arg("frame") = "ct", "Copies an array [z, y, x], as Volume does.")
       .def("__repr__", [](const SignedField& self) { return "<marrow.SignedField " + text_of(self.grid, "mm") + ">"; });
   bind_grid(field, &SignedField::values_mm);
+}
+
+void note_mapped_samples(const void* item, const float* samples) {
+  const std::scoped_lock lock(mapped().mutex);
+  mapped().samples[item] = samples;
+}
+
+void forget_mapped_samples(const void* item) {
+  const std::scoped_lock lock(mapped().mutex);
+  mapped().samples.erase(item);
+}
+
+const float* samples_of_item(const void* item, const std::vector<float>& own) {
+  if (!own.empty()) return own.data();
+  const std::scoped_lock lock(mapped().mutex);
+  const auto found = mapped().samples.find(item);
+  return found == mapped().samples.end() ? own.data() : found->second;
+}
+
+bool is_mapped(const void* item) {
+  const std::scoped_lock lock(mapped().mutex);
+  return mapped().samples.contains(item);
 }
 
 }  // namespace marrow::python

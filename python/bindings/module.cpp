@@ -2,7 +2,6 @@
 // The extension module marrow._core. The package's Python files give it the shape that users see.
 #include <pybind11/pybind11.h>
 
-#include "marrow/base/error.hpp"
 #include "pipelines.hpp"
 #include "values.hpp"
 

@@ -2,13 +2,14 @@
 #pragma once
 #include <pybind11/pybind11.h>
 
+#include <atomic>
+#include <functional>
 #include <map>
 #include <memory>
 #include <string>
 #include <vector>
 
 #include "marrow/runtime/pipeline/pipeline.hpp"
-#include "marrow/runtime/plugins/catalogue.hpp"
 
 namespace marrow::python {
 
@@ -35,5 +36,10 @@ py::list list_of(const Diagnostics& diagnostics, const NodeInfo* called = nullpt
 void bind_catalogue(py::module_& module);
 void bind_pipelines(py::module_& module);
 void bind_runs(py::module_& module);
+
+/// Does the work on a thread of its own, without Python's lock, and waits for its end. If Python gets a signal
+/// meanwhile (Ctrl-C) and its handler raises an exception, `cancelled` becomes true; the exception goes on when the
+/// work has ended. No signal handler is changed. What the work throws is thrown.
+void do_interruptibly(std::atomic<bool>& cancelled, const std::function<void()>& work);
 
 }  // namespace marrow::python

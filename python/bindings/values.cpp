@@ -3,7 +3,6 @@
 
 #include <pybind11/stl.h>
 
-#include "marrow/base/error.hpp"
 #include "marrow/base/names.hpp"
 #include "marrow/base/number_text.hpp"
 

@@ -3,16 +3,19 @@
 // marrow's values as Python objects, and back. A Python object shares the value's data, and nobody can change them.
 #include <pybind11/pybind11.h>
 
+#include <Eigen/Core>
 #include <functional>
 #include <memory>
+#include <opencv2/core.hpp>
 #include <optional>
 #include <string>
 #include <vector>
 
-#include "arrays.hpp"
 #include "marrow/runtime/node/types.hpp"
 
 namespace marrow::python {
+
+namespace py = pybind11;
 
 /// A value of a type that has no class in Python: a function, such as a cost, or a type of a plugin's own.
 struct OtherValue {
@@ -91,5 +94,64 @@ void bind_functions(py::module_& module);
 void bind_asked(py::module_& module);
 /// What processes of nodes written in Python need.
 void bind_worker(py::module_& module);
+
+// Memory of marrow's values as numpy arrays, and back. Only the buffer protocol is used, so that any version of numpy
+// fits.
+
+/// A piece of memory as numpy sees it. It keeps the memory's owner alive.
+struct Buffer {
+  std::shared_ptr<const void> owner;
+  py::buffer_info info;
+};
+
+/// The same for memory of `shape`, of which the last axis runs fastest.
+template <class T>
+py::buffer_info buffer_of(const T* data, std::vector<py::ssize_t> shape) {
+  std::vector<py::ssize_t> strides(shape.size());
+  py::ssize_t stride = sizeof(T);
+  for (std::size_t i = shape.size(); i-- > 0; stride *= shape[i]) strides[i] = stride;
+  return {
+      const_cast<T*>(data), sizeof(T), py::format_descriptor<T>::format(), py::ssize_t(shape.size()), std::move(shape),
+      std::move(strides),   true};
+}
+py::buffer_info buffer_of(const cv::Mat& pixels);
+
+/// A read-only numpy array of this memory, without a copy.
+py::object array_of(std::shared_ptr<const void> owner, py::buffer_info info);
+/// A numpy array with a copy of the numbers, which the caller may change.
+py::object array_of(const Eigen::MatrixXd& matrix);
+/// The 4 x 4 matrix of a transform.
+py::object array_of(const RigidTransform& transform);
+
+/// Anything that numpy takes as an array of real numbers, as an array of this type in C order. Throws Error if it is
+/// none, or if numbers would get lost or change: masked ones, complex ones, whole numbers that the type cannot hold.
+/// `what` names it in the message.
+py::object array_of_real(const py::handle& object, const char* type, const std::string& what);
+/// The numbers of anything that numpy takes as an array of this shape; -1 stands for any length. Throws Error if the
+/// shape is another or a number is not one. `what` names it in the message.
+std::vector<double> numbers_of(const py::handle& object, const std::vector<py::ssize_t>& shape,
+                               const std::string& what);
+/// The rotation and translation of a 4 x 4 matrix. Throws Error if it is not rigid.
+RigidTransform transform_of(const py::handle& matrix, const std::string& target, const std::string& source,
+                            const std::string& what);
+/// A copy of an array of 2 axes as pixels of 8 or 16 bits or 32-bit floating point. float64 becomes float32. Throws
+/// Error for other types and shapes.
+cv::Mat pixels_of(const py::handle& object, const std::string& what);
+/// A copy of an array as 32-bit numbers, and its shape of 3 axes. Throws Error for other shapes.
+std::pair<std::vector<float>, std::vector<py::ssize_t>> samples_of(const py::handle& object, const std::string& what);
+
+void bind_buffer(py::module_& module);
+
+// Volumes and signed fields whose samples are not in the object itself, but in memory that was mapped.
+
+/// From now on, the samples of this Volume or SignedField, whose own list is empty, are at `samples`.
+void note_mapped_samples(const void* item, const float* samples);
+void forget_mapped_samples(const void* item);
+
+/// The samples of a Volume or SignedField, wherever they are.
+const float* samples_of_item(const void* item, const std::vector<float>& own);
+
+/// Whether the samples are elsewhere.
+bool is_mapped(const void* item);
 
 }  // namespace marrow::python

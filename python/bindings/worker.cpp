@@ -13,12 +13,9 @@
 #include <set>
 #include <thread>
 
-#include "mapped.hpp"
-#include "marrow/base/error.hpp"
 #include "marrow/base/framework_file.hpp"
 #include "marrow/base/process_state.hpp"
 #include "marrow/base/process_tree.hpp"
-#include "marrow/runtime/plugins/library.hpp"
 #include "marrow/runtime/plugins/linked_libraries.hpp"
 #include "marrow/runtime/plugins/trust.hpp"
 #include "marrow/runtime/process/packed_values.hpp"

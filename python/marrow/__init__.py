@@ -10,55 +10,13 @@ Each node of a plugin is also a function: marrow.edges.canny(view, noise_high=5)
 from . import display as _display
 from . import nodes as _nodes
 from . import plots as _plots
-from ._core import (
-    Camera,
-    Case,
-    Cost,
-    EdgeMap,
-    Image,
-    Landmarks,
-    Landscape,
-    Mesh,
-    Metrics,
-    Minimum,
-    Optimizer,
-    OtherValue,
-    OutlineProjector,
-    Picture,
-    Pose,
-    Profile,
-    RadiographProjector,
-    Scene,
-    Seeds,
-    ShaftLines,
-    SignedField,
-    Stop,
-    Transform,
-    Truth,
-    Verdict,
-    View,
-    Volume,
-)
+from ._core import Camera, Case, Cost, EdgeMap, Image, Landmarks, Landscape, Mesh, Metrics, Minimum, Optimizer
+from ._core import OtherValue, OutlineProjector, Picture, Pose, Profile, RadiographProjector, Scene, Seeds, ShaftLines
+from ._core import SignedField, Stop, Transform, Truth, Verdict, View, Volume
 from ._core import _version as __version__
 from ._core import forget_catalogue as find_plugins_again
-from .annotations import (
-    as_many_or_none,
-    at_least,
-    at_least_one,
-    at_most,
-    below,
-    beside,
-    distinct,
-    exactly_one,
-    figures,
-    length,
-    named,
-    not_above,
-    over,
-    replaces,
-    same_length,
-    unit,
-)
+from .annotations import as_many_or_none, at_least, at_least_one, at_most, below, beside, distinct, exactly_one, figures
+from .annotations import length, named, not_above, over, replaces, same_length, unit
 from .comparison import Comparison, compare
 from .context import Context
 from .declaration import cost, projector

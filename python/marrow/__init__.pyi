@@ -1,66 +1,25 @@
 # SPDX-License-Identifier: Apache-2.0
-from ._core import Camera as Camera
-from ._core import Case as Case
-from ._core import Cost as Cost
-from ._core import EdgeMap as EdgeMap
-from ._core import Image as Image
-from ._core import Landmarks as Landmarks
-from ._core import Landscape as Landscape
-from ._core import Mesh as Mesh
-from ._core import Metrics as Metrics
-from ._core import Minimum as Minimum
-from ._core import Optimizer as Optimizer
-from ._core import OtherValue as OtherValue
-from ._core import OutlineProjector as OutlineProjector
-from ._core import Picture as Picture
-from ._core import Pose as Pose
-from ._core import Profile as Profile
-from ._core import RadiographProjector as RadiographProjector
-from ._core import Scene as Scene
-from ._core import Seeds as Seeds
-from ._core import ShaftLines as ShaftLines
-from ._core import SignedField as SignedField
-from ._core import Stop as Stop
-from ._core import Transform as Transform
-from ._core import Truth as Truth
-from ._core import Verdict as Verdict
-from ._core import View as View
-from ._core import Volume as Volume
-from ._core import _version as __version__
-from ._core import forget_catalogue as find_plugins_again
-from .annotations import as_many_or_none as as_many_or_none
-from .annotations import at_least as at_least
-from .annotations import at_least_one as at_least_one
-from .annotations import at_most as at_most
-from .annotations import below as below
-from .annotations import beside as beside
-from .annotations import distinct as distinct
-from .annotations import exactly_one as exactly_one
-from .annotations import figures as figures
-from .annotations import length as length
-from .annotations import named as named
-from .annotations import not_above as not_above
-from .annotations import over as over
-from .annotations import replaces as replaces
-from .annotations import same_length as same_length
+from ._core import Camera as Camera, Case as Case, Cost as Cost, EdgeMap as EdgeMap, Image as Image
+from ._core import Landmarks as Landmarks, Landscape as Landscape, Mesh as Mesh, Metrics as Metrics, Minimum as Minimum
+from ._core import Optimizer as Optimizer, OtherValue as OtherValue, OutlineProjector as OutlineProjector
+from ._core import Picture as Picture, Pose as Pose, Profile as Profile, RadiographProjector as RadiographProjector
+from ._core import Scene as Scene, Seeds as Seeds, ShaftLines as ShaftLines, SignedField as SignedField, Stop as Stop
+from ._core import Transform as Transform, Truth as Truth, Verdict as Verdict, View as View, Volume as Volume
+from ._core import _version as __version__, forget_catalogue as find_plugins_again
+from .annotations import as_many_or_none as as_many_or_none, at_least as at_least, at_least_one as at_least_one
+from .annotations import at_most as at_most, below as below, beside as beside, distinct as distinct
+from .annotations import exactly_one as exactly_one, figures as figures, length as length, named as named
+from .annotations import not_above as not_above, over as over, replaces as replaces, same_length as same_length
 from .annotations import unit as unit
-from .comparison import Comparison as Comparison
-from .comparison import compare as compare
+from .comparison import Comparison as Comparison, compare as compare
 from .context import Context as Context
-from .declaration import cost as cost
-from .declaration import projector as projector
-from .errors import Error as Error
-from .errors import Fault as Fault
-from .errors import PipelineError as PipelineError
-from .errors import RunError as RunError
-from .files import load as load
-from .files import save as save
+from .declaration import cost as cost, projector as projector
+from .errors import Error as Error, Fault as Fault, PipelineError as PipelineError, RunError as RunError
+from .files import load as load, save as save
 from .items import Items as Items
 from .nodes import *
 from .pages import show as show
 from .pipeline import Pipeline as Pipeline
-from .problem import BudgetSpent as BudgetSpent
-from .problem import Problem as Problem
-from .result import NodeReport as NodeReport
-from .result import Result as Result
+from .problem import BudgetSpent as BudgetSpent, Problem as Problem
+from .result import NodeReport as NodeReport, Result as Result
 from .tables import Table as Table

@@ -1,19 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-from typing import (
-    Any,
-    Callable,
-    Dict,
-    Final,
-    Iterable,
-    Iterator,
-    List,
-    Mapping,
-    Optional,
-    Sequence,
-    Tuple,
-    Union,
-    overload,
-)
+from typing import Any, Callable, Dict, Final, Iterable, Iterator, List, Mapping, Optional, Sequence, Tuple, Union
+from typing import overload
 
 import numpy
 import numpy.typing

@@ -6,24 +6,6 @@ low: Annotated[float, marrow.at_least(0), marrow.unit("%"), "lower threshold"] =
 from dataclasses import dataclass
 from typing import Any, Dict, List
 
-__all__ = [
-    "at_least",
-    "at_most",
-    "unit",
-    "length",
-    "beside",
-    "replaces",
-    "over",
-    "named",
-    "not_above",
-    "below",
-    "same_length",
-    "as_many_or_none",
-    "exactly_one",
-    "at_least_one",
-    "distinct",
-]
-
 
 @dataclass(frozen=True)
 class Note:

@@ -9,8 +9,6 @@ from . import _core, program
 from .pipeline import checked_pipeline
 from .tables import Table
 
-__all__ = ["Comparison", "compare"]
-
 
 class Comparison:
     """The answer of a comparison, as tables.

@@ -5,8 +5,6 @@ from typing import Any, Callable, Dict, Optional
 
 from .errors import Error
 
-__all__ = ["Context"]
-
 
 class Context:
     """A node takes it as a parameter `context: marrow.Context`. One that you make yourself, for tests, reports

@@ -6,7 +6,6 @@ import typing
 from typing import Any, Callable, Dict, List, Optional, Tuple
 
 from . import _core
-from .annotations import Note
 from .context import Context
 from .errors import Error
 from .items import Items
@@ -262,6 +261,3 @@ def _add_outputs(made: Declaration, hint: Any) -> None:
         what = "output '%s' of %s" % (port, name) if port else "the output of " + name
         own = port[:-1] if port.endswith("_") else port
         made.manifest["outputs"].append(_port(what, own, kind, True))
-
-
-__all__ = ["Context", "Declaration", "Note", "completed", "cost", "declared", "nodes_of", "optimizer", "projector"]

@@ -10,7 +10,6 @@ from . import _core, nodes
 from .errors import Error
 from .items import Items
 
-__all__ = ["load", "save"]
 
 # The node that reads a file, by the end of its name. Others say it themselves, or the caller does.
 READERS = {

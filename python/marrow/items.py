@@ -2,7 +2,6 @@
 """Lists of named items along an axis, such as the views of a case."""
 from typing import Iterator, List, Mapping, TypeVar
 
-__all__ = ["Items"]
 _T = TypeVar("_T")
 
 

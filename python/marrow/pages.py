@@ -10,8 +10,6 @@ from . import program
 from .comparison import Comparison
 from .result import Result
 
-__all__ = ["show"]
-
 
 def show(what: Union[Result, Comparison, str, "os.PathLike[str]"], *, open_browser: bool = True) -> pathlib.Path:
     """Writes a page with figures, pictures and a 3D view of a result, a comparison or the folder of a run, and opens it

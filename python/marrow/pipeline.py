@@ -8,7 +8,6 @@ from .errors import Error, Fault, PipelineError
 from .progress import Printer
 from .result import Result, checked
 
-__all__ = ["Pipeline"]
 
 _T = TypeVar("_T")
 Progress = Union[bool, Callable[[Dict[str, Any]], None]]
@@ -82,9 +81,8 @@ class Pipeline:
             read = read.with_given(dict(given))
         place = None if folder is None or folder is False else "" if folder is True else os.fspath(folder)
         observer = Printer() if progress is True else progress or None
-        return checked(
-            Result(_core.run(read, observer, natural("seed", seed), natural("threads", threads), keep, place))
-        )
+        made = _core.run(read, observer, natural("seed", seed), natural("threads", threads), keep, place)
+        return checked(Result(made))
 
     @property
     def name(self) -> str:

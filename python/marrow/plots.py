@@ -6,8 +6,6 @@ from typing import Any
 from . import _core
 from .errors import Error
 
-__all__ = ["plot_landscape"]
-
 
 def plot_landscape(landscape: Any, figure: Any = None) -> Any:
     """The cost along each axis in matplotlib, with a dashed line at the exact pose where it is known. `figure`: one to

@@ -18,12 +18,10 @@ import numpy
 from . import _core, functions
 from .context import Context
 from .declaration import Declaration, completed, nodes_of
-from .errors import Error
-from .explained import explained
+from .errors import Error, explained
 from .items import Items
-from .kept_state import KeptState
+from .trust import KeptState, TrustedModules
 from .modules import import_from_source, loaded_files
-from .trust import TrustedModules
 
 _MADE = 3  # the descriptor through which values are handed over
 _REPLIES = 4  # the descriptor from which the replies to questions are read
@@ -143,9 +141,8 @@ class Process:
     def _function(self, request: Dict[str, Any]) -> Tuple[Declaration, Any]:
         """The node and the function that it makes. It is made when it is first asked for."""
         node = self.load()[request["node"]]
-        made = self.functions.get(
-            request["function"], node, lambda: node.function(**self._all_arguments(node, request))
-        )
+        make = lambda: node.function(**self._all_arguments(node, request))
+        made = self.functions.get(request["function"], node, make)
         return node, made
 
     def _all_arguments(self, node: Declaration, request: Dict[str, Any]) -> Dict[str, Any]:

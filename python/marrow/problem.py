@@ -7,8 +7,6 @@ import numpy
 from . import _core
 from .errors import Error
 
-__all__ = ["BudgetSpent", "Problem"]
-
 
 class BudgetSpent(Exception):
     """No more values may be asked for. An optimizer lets it pass: the best point so far is the result."""

@@ -8,8 +8,6 @@ from typing import Any, Dict, Iterator, List, Mapping, Optional, Union
 from . import _core
 from .errors import Fault, RunError
 
-__all__ = ["NodeReport", "Result"]
-
 
 @dataclasses.dataclass(frozen=True)
 class NodeReport:

@@ -11,31 +11,9 @@ from typing import Any, Dict, List
 from . import _core
 from .nodes import documentation, python_name
 
-_VALUES = {
-    "image": "Image",
-    "picture": "Picture",
-    "volume": "Volume",
-    "signed_field": "SignedField",
-    "seeds": "Seeds",
-    "mesh": "Mesh",
-    "camera": "Camera",
-    "view": "View",
-    "edge_map": "EdgeMap",
-    "shaft_lines": "ShaftLines",
-    "landmarks": "Landmarks",
-    "pose": "Pose",
-    "truth": "Truth",
-    "metrics": "Metrics",
-    "verdict": "Verdict",
-    "stop": "Stop",
-    "scene": "Scene",
-    "landscape": "Landscape",
-    "case": "Case",
-    "cost": "Cost",
-    "optimizer": "Optimizer",
-    "outline_projector": "OutlineProjector",
-    "radiograph_projector": "RadiographProjector",
-}
+_TYPES = """image picture volume signed_field seeds mesh camera view edge_map shaft_lines landmarks pose truth metrics
+verdict stop scene landscape case cost optimizer outline_projector radiograph_projector"""
+_VALUES = {name: name.title().replace("_", "") for name in _TYPES.split()}  # their classes in Python
 _OPTIONS = {
     "boolean": "bool",
     "integer": "int",

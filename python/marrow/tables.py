@@ -3,8 +3,6 @@
 import html
 from typing import Any, Dict, List
 
-__all__ = ["Table"]
-
 
 class Table(List[Dict[str, Any]]):
     """Rows, each a dictionary with the same keys. In a notebook it is shown as a table."""

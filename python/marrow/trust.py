@@ -1,16 +1,48 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Modules that others could change are not imported by a node written in Python."""
+"""Modules that others could change are not imported by a node written in Python; the state of its process is kept."""
 import contextlib
 import os
 import sys
 from importlib.machinery import ModuleSpec
 from types import ModuleType
-from typing import Any, List, Optional
+from typing import Any, Iterator, List, Optional
 
 from . import _core
 from .errors import Error
 from .installed import is_standard
-from .kept_state import KeptState
+
+
+class KeptState:
+    """The state of the process as it must stay from one call to the next."""
+
+    def __init__(self) -> None:
+        self._before_import = ""
+        self._imports = 0
+        self._process = _core.ProcessState()
+
+    def begin(self) -> None:
+        """A call begins: numbers are calculated with as usual, whatever ran before."""
+        self._process.begin_call()
+
+    @contextlib.contextmanager
+    def importing(self) -> Iterator[None]:
+        """While a module runs for the first time. What it changes is no fault of the call, and stays."""
+        if self._imports == 0:
+            self._before_import = self._before_import or self._process.put_back()
+        self._imports += 1
+        try:
+            yield
+        finally:
+            self._imports -= 1
+            if self._imports == 0:
+                self._process = _core.ProcessState()
+                self.begin()
+
+    def changed(self) -> str:
+        """What the call has changed, in words; an empty text if it has left all as it was."""
+        changed = self._before_import or self._process.put_back()
+        self._before_import = ""
+        return changed
 
 
 class TrustedModules:

@@ -10,10 +10,7 @@
 #include <fstream>
 #include <random>
 
-#include "marrow/base/diagnostics.hpp"
 #include "marrow/compare/cell.hpp"
-#include "marrow/compare/experiment.hpp"
-#include "marrow/runtime/plugins/catalogue.hpp"
 
 namespace {
 

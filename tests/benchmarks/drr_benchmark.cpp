@@ -5,13 +5,9 @@
 #include <tbb/global_control.h>
 #include <tbb/parallel_for.h>
 
-#include <cmath>
-#include <cstdio>
-#include <cstring>
 #include <fstream>
 #include <random>
 
-#include "marrow/domain/c_arm.hpp"
 #include "marrow/plugin.hpp"
 #include "tests/benchmarks/timing.hpp"
 

@@ -4,8 +4,6 @@
 // besides; it may take ten times as long. Exit code 1 when it takes longer.
 #include <tbb/global_control.h>
 
-#include <cstdio>
-#include <marrow/runtime/node/types.hpp>
 #include <opencv2/imgproc.hpp>
 
 #include "tests/benchmarks/timing.hpp"

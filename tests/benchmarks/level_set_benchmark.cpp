@@ -6,14 +6,11 @@
 #include <tbb/global_control.h>
 #include <unistd.h>
 
-#include <cstdio>
-#include <cstring>
-
 #include "itk_geodesic.hpp"
 #include "marrow/toolbox/field/interior.hpp"
 #include "plugins/segment/level_set.cpp"
 #include "tests/benchmarks/timing.hpp"
-#include "tests/plugins/segment/distal_end.hpp"
+#include "tests/plugins/segment/phantom.hpp"
 
 namespace {
 

@@ -12,8 +12,6 @@
 #include <vtkPolyData.h>
 #include <vtkVersion.h>
 
-#include <cstdio>
-
 #include "plugins/mesh/marching_cubes.cpp"
 #include "tests/benchmarks/timing.hpp"
 #include "vtk_threads.hpp"

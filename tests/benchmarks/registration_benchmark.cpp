@@ -6,14 +6,9 @@
 // grey values (pipelines/femur/femur-intensity.yaml), with how far from the truth they end.
 #include <benchmark/benchmark.h>
 
-#include <algorithm>
-#include <cstdio>
-#include <map>
-#include <marrow/base/error.hpp>
 #include <marrow/runtime/node/types.hpp>
 #include <marrow/runtime/run/executor.hpp>
 #include <random>
-#include <set>
 
 #include "tests/benchmarks/timing.hpp"
 

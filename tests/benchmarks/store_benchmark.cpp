@@ -3,12 +3,9 @@
 // store that is on the same disk.
 #include <benchmark/benchmark.h>
 
-#include <filesystem>
-
 #include "marrow/runtime/node/types.hpp"
-#include "marrow/runtime/store/shared_claim.hpp"
+#include "marrow/runtime/store/shared_folder.hpp"
 #include "marrow/runtime/store/shared_store.hpp"
-#include "marrow/runtime/store/store.hpp"
 #include "tests/benchmarks/timing.hpp"
 
 namespace {

@@ -1,16 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 // What benchmarks share: how long a piece of work takes, and a short run, by which the tests see that each still works.
-#include <algorithm>
 #include <chrono>
 #include <cstdio>
 #include <cstdlib>
 #include <ctime>
 #include <exception>
-#include <string>
-#include <vector>
 
-#include "marrow/base/error.hpp"
 #include "marrow/runtime/plugins/catalogue.hpp"
 
 namespace timing {

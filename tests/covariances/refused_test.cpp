@@ -1,13 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Not every 6 x 6 matrix is a covariance. Each node that takes a pose with its covariance refuses a matrix that is not
 // symmetric or has a negative eigenvalue. (The tests of readers and of the runtime do the same for files and outputs.)
-#include <gtest/gtest.h>
 
-#include <memory>
-#include <string>
-
-#include "shipped.hpp"
-#include "tests/framework/domain/shapes.hpp"
 #include "tests/plugins/register/well.hpp"
 
 namespace covariances_test {

@@ -12,7 +12,7 @@ from harness import formats
 
 SENTENCE = re.compile(r"^(marrow: (error: |stopped)|\S+: error: ).{8}", re.MULTILINE)
 # A folder of libraries with the few plugins that are used: the manifests of all of them are most of a small run's work.
-PLUGINS = ("read", "write")
+PLUGINS = ("read", "read_more", "write")
 
 PIPELINE = """marrow: 1
 name: small

@@ -1,9 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 // Identities of other processes, as they stand in names of temporary files and in claims.
-#include <string>
 
-#include "marrow/base/process_identity.hpp"
+#include "marrow/base/process_tree.hpp"
 
 namespace runtime_fixture {
 

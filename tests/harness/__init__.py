@@ -22,7 +22,7 @@ def skip(reason):
     sys.exit(77)
 
 
-def need_scipy():
-    """Skips the whole test where numpy or scipy is missing."""
-    if not all(importlib.util.find_spec(name) for name in ("numpy", "scipy")):
-        skip("numpy and scipy are missing: apt-get install python3-scipy")
+def need_scipy(*more):
+    """Skips the whole test where numpy, scipy or another module is missing."""
+    if not all(importlib.util.find_spec(name) for name in ("numpy", "scipy", *more)):
+        skip("numpy, scipy or Pillow is missing: apt-get install python3-scipy python3-pil")

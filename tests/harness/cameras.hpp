@@ -1,10 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 // Cameras whose projections a hand can compute.
-#include <Eigen/Geometry>
 #include <cmath>
 #include <marrow/domain/camera.hpp>
-#include <optional>
 
 namespace marrow::test {
 

@@ -3,7 +3,6 @@
 #include <gtest/gtest.h>
 
 #include <marrow/base/error.hpp>
-#include <string>
 
 namespace marrow::test {
 
@@ -19,6 +18,9 @@ std::string message_of(Function function) {
 }
 
 inline bool has(const std::string& text, const std::string& part) { return text.find(part) != std::string::npos; }
+inline bool is_framed(const std::string& text, const std::string& first, const std::string& last) {
+  return text.starts_with(first) && text.ends_with(last);
+}
 
 }  // namespace marrow::test
 
@@ -26,3 +28,6 @@ inline bool has(const std::string& text, const std::string& part) { return text.
 #define MESSAGE_OF(...) ::marrow::test::message_of([&] { (void)(__VA_ARGS__); })
 /// That the text has this part.
 #define EXPECT_HAS(text, part) EXPECT_PRED2(::marrow::test::has, text, part)
+/// That the text begins like this, and ends like that.
+#define EXPECT_BEGINS(text, first) EXPECT_FRAME(text, first, "")
+#define EXPECT_FRAME(text, first, last) EXPECT_PRED3(::marrow::test::is_framed, text, first, last)

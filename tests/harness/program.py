@@ -72,12 +72,14 @@ def end(process):
 class Case(unittest.TestCase):
     """A test with a folder of its own, in which it runs the program.
 
-    `plugins` are the folders of plugins that it uses besides the shipped ones, `environment` are further variables of
-    all its calls. Its store of results is its own too, or, without `has_own_store`, that of all tests of the process.
+    `plugins` are the folders of plugins that it uses besides the shipped ones, `files` are in its folder by their
+    names, `environment` are further variables of all its calls. Its store of results is its own too, or, without
+    `has_own_store`, that of all tests of the process.
     """
 
     plugins = [TEST_PLUGINS]
     environment = {}
+    files = {}
     has_own_store = True
 
     @classmethod
@@ -90,6 +92,8 @@ class Case(unittest.TestCase):
     def setUp(self):
         self.scratch = pathlib.Path(tempfile.mkdtemp(prefix="marrow-cli-"))
         self.addCleanup(shutil.rmtree, self.scratch, ignore_errors=True)
+        for name, content in self.files.items():
+            self.write(name, content)
 
     def variables(self):
         store = {"MARROW_CACHE": str(self.scratch / "cache")} if self.has_own_store else {}

@@ -1,6 +1,25 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How the nodes are called that read files: (inputs, options) by the node's name."""
+"""How the nodes are called that read files, and those that run programs: each of these copies a file of its output's
+type, by a script. Inputs and options by the node's name."""
 from files_of_scene import labels_of, surface_of, written
+from harness.package import SCRATCH
+
+# It lasts long enough that a limit of its time or memory is noticed.
+COPY = "import shutil, sys, time\ntime.sleep(0.3)\nshutil.copy(sys.argv[1], sys.argv[2])\n"
+FORMATS = {"field": "mha", "image": "png", "mesh": "ply", "metrics": "json", "volume": "mha"}
+
+
+def copied(name):
+    script, figures = SCRATCH / "copy.py", SCRATCH / "figures.json"
+    script.write_text(COPY)
+    figures.write_text('{"a": 1}')
+    case = written() / "case"
+    sources = {"mesh": written() / "model.ply", "metrics": figures, "image": case / "frontal.png"}
+    return lambda: dict(
+        command=["python3", "{files.1}", "{files.2}", "{output.%s}" % FORMATS[name]],
+        version_command=["python3", "--version"],
+        files=[str(script), str(sources.get(name, case / "ct.mha"))],
+    )
 
 
 def calls(s):
@@ -12,29 +31,24 @@ def calls(s):
 
     size = dict(image_size_px=[96, 96])
     return {
-        "read.camera": lambda: ({}, {"path": at("matrix.txt"), **size}),
-        "read.cameras": lambda: (
-            {},
-            {"path": at("rtk.xml"), "names": ["a", "b"], **size, "pixel_mm": [3], "mirror": "upside_down"},
+        **{"run.program_" + name: copied(name) for name in FORMATS},
+        "read.camera": lambda: dict(path=at("matrix.txt"), **size),
+        "read.cameras": lambda: dict(path=at("rtk.xml"), names=["a", "b"], **size, pixel_mm=[3], mirror="upside_down"),
+        "read.case": lambda: dict(path=at("case")),
+        "read.image": lambda: dict(path=case("frontal.png")),
+        "read.images": lambda: dict(paths=[case("frontal.png"), case("lateral.png")]),
+        "read.implant": lambda: dict(holes=at("nail/holes.yaml"), surface=at("nail/surface.stl")),
+        "read.labels": lambda: dict(path=labels_of(1, 2)),
+        "read.landmarks": lambda: dict(path=at("landmarks.yaml")),
+        "read.mesh": lambda: dict(path=at("model.ply")),
+        "read.pose": lambda: dict(path=at("transform.tfm")),
+        "read.seeds": lambda: dict(path=at("seeds.yaml")),
+        "read.view": lambda: dict(image=case("frontal.png"), camera=at("matrix.txt")),
+        "read.views": lambda: dict(
+            names=["a", "b"],
+            images=[case("frontal.png"), case("lateral.png")],
+            cameras=[at("matrix.txt"), at("matrix.txt")],
         ),
-        "read.case": lambda: ({}, {"path": at("case")}),
-        "read.image": lambda: ({}, {"path": case("frontal.png")}),
-        "read.images": lambda: ({}, {"paths": [case("frontal.png"), case("lateral.png")]}),
-        "read.implant": lambda: ({}, {"holes": at("nail/holes.yaml"), "surface": at("nail/surface.stl")}),
-        "read.labels": lambda: ({}, {"path": labels_of(1, 2)}),
-        "read.landmarks": lambda: ({}, {"path": at("landmarks.yaml")}),
-        "read.mesh": lambda: ({}, {"path": at("model.ply")}),
-        "read.pose": lambda: ({}, {"path": at("transform.tfm")}),
-        "read.seeds": lambda: ({}, {"path": at("seeds.yaml")}),
-        "read.view": lambda: ({}, {"image": case("frontal.png"), "camera": at("matrix.txt")}),
-        "read.views": lambda: (
-            {},
-            {
-                "names": ["a", "b"],
-                "images": [case("frontal.png"), case("lateral.png")],
-                "cameras": [at("matrix.txt"), at("matrix.txt")],
-            },
-        ),
-        "read.volume": lambda: ({}, {"path": case("ct.mha")}),
-        "simulate.surface": lambda: ({}, {"outer": str(surface_of(s.coarse_mesh, "outer")), "cortex_mm": [4]}),
+        "read.volume": lambda: dict(path=case("ct.mha")),
+        "simulate.surface": lambda: dict(outer=str(surface_of(s.coarse_mesh, "outer")), cortex_mm=[4]),
     }

@@ -3,21 +3,20 @@
 import keyword
 import unittest
 
-import calls_of_bones  # noqa: E402
-import calls_of_files  # noqa: E402
-import calls_of_programs  # noqa: E402
-import calls_of_simulation  # noqa: E402
-from alternatives import alternatives  # noqa: E402
-from digests import digest_of  # noqa: E402
+import calls_of_bones
+import calls_of_files
+import calls_of_simulation
+from alternatives import alternatives
+from digests import digest_of
 from harness.package import main, marrow
 from harness.sample import sample
-from scene import Scene  # noqa: E402
-from tries import TRIES  # noqa: E402
-from untried import UNTRIED  # noqa: E402
+from scene import Scene
+from tries import TRIES
+from untried import UNTRIED
 
 SCENE = Scene()
 CALLS = {}
-for module in (calls_of_bones, calls_of_simulation, calls_of_files, calls_of_programs):
+for module in (calls_of_bones, calls_of_simulation, calls_of_files):
     CALLS.update(module.calls(SCENE))
 # Options that change no output, each with the reason.
 BESIDE_BONE = "squares that do not show the bone do not count, and a margin of one is always there"
@@ -54,7 +53,10 @@ def tries_of(name, option, options):
 
 def has_effect(name, option, known):
     """True, or why not. `known` keeps the results of the node's calls, as most tries are compared with the same one."""
-    inputs, options = CALLS[name]()
+    given, ports = CALLS[name](), {port["name"] for port in NODES[name]["inputs"]}
+    # An input and an option may have one name: a text is a path, and no input.
+    options = {key: value for key, value in given.items() if key not in ports or isinstance(value, str)}
+    inputs = {key: value for key, value in given.items() if key not in options}
 
     def result(tried):
         key = repr(sorted(tried.items(), key=str))

@@ -5,130 +5,95 @@ import functools
 import numpy
 from harness.package import SCRATCH, SOURCE, marrow
 
-
 SHORT_SEARCH = {"candidates": 1, "scan_rotation_deg": 3, "scan_translation_mm": 3}
+MADE = {
+    "bone": lambda s: marrow.simulate.femur(resolution_mm=3),
+    "phantom": lambda s: marrow.simulate.fracture(bone=s.bone, rotation_deg=[3, -4, 5], translation_mm=[4, -3, 5]),
+    "cluttered": lambda s: marrow.simulate.clutter(phantom=s.phantom).phantom,
+    "cameras": lambda s: marrow.camera.carm(width_px=160, height_px=160, pixel_mm=1.9),
+    "volume": lambda s: marrow.simulate.ct(phantom=s.phantom, spacing_mm=[1.6, 1.6, 2], range_mm=[0, 250]),
+    "views": lambda s: marrow.simulate.fluoroscopy(phantom=s.phantom, cameras=s.cameras),
+    "parts": lambda s: marrow.simulate.truth(phantom=s.phantom),
+    "truth": lambda s: s.parts.truths["distal"].matrix,
+    # Near the truth, with the fragment's axes.
+    "start": lambda s: marrow.initial.manual(
+        model=s.mesh, start=s.parts.starts["distal"], rotation_deg=[1, -1, 2], translation_mm=[1, 1, -1]
+    ),
+    "mesh": lambda s: s.parts.models["distal"],
+    "field": lambda s: s.fields["distal"],
+    # Another bone in the same place.
+    "other_field": lambda s: marrow.segment.threshold(volume=s.volume, seeds=s.case.seeds, threshold_hu=300)["distal"],
+    "fields": lambda s: marrow.segment.threshold(volume=s.volume, seeds=s.case.seeds),
+    "coarse_mesh": lambda s: marrow.mesh.simplify(mesh=s.mesh, triangles=600),
+    "edges": lambda s: marrow.edges.canny(s.views),
+    "lines": lambda s: marrow.shaft.hough_pairs(edges=s.edges, view=s.views),
+    "outline": lambda s: marrow.project.silhouette(model=s.coarse_mesh),
+    "drr": lambda s: marrow.project.joseph(volume=s.volume, field=s.field),
+    "contour": lambda s: marrow.similarity.contour_distance(projector=s.outline, views=s.views, edges=s.edges),
+    "grey": lambda s: marrow.similarity.gradient_correlation(projector=s.drr, views=s.views),
+    "optimizer": lambda s: marrow.optimizer.bobyqa(),
+    # A pose with a covariance, and the stages to it.
+    "found": lambda s: marrow.register.multiresolution(
+        cost=s.contour, optimizer=s.optimizer, start=s.start, **SHORT_SEARCH
+    ),
+    "sequence": lambda s: marrow.register.sequence(
+        cost=s.contour, finer_cost=s.grey, optimizer=s.optimizer, start=s.start, **SHORT_SEARCH
+    ),
+    "both_outlines": lambda s: {name: marrow.project.silhouette(model=mesh) for name, mesh in s.parts.models.items()},
+    "both_drrs": lambda s: {
+        name: marrow.project.joseph(volume=s.volume, field=field) for name, field in s.fields.items()
+    },
+    "closed_mesh": lambda s: marrow.mesh.marching_cubes(field=s.two_parts),
+    # A pose known from elsewhere, with its covariance.
+    "known": lambda s: marrow.initial.skin_markers(model=s.mesh, landmarks=s.skin),
+    "landmarks": lambda s: marrow.simulate.landmarks(phantom=s.phantom, cameras=s.cameras)["distal"],
+    "skin": lambda s: marrow.simulate.skin_markers(phantom=s.phantom)["distal"],
+    "nail": lambda s: marrow.simulate.nail(resolution_mm=2),
+    "nailed": lambda s: marrow.simulate.nailing(phantom=s.reduced, implant=s.nail.implant),
+    "plated": lambda s: marrow.simulate.clutter(phantom=s.phantom, plate="mild", fat="mild").phantom,
+    "arm": lambda s: marrow.simulate.camera_arm(),
+    "boards": lambda s: marrow.simulate.chessboard(arm=s.arm, photographs=5),
+    "photographed": lambda s: marrow.camera.chessboard(boards=s.boards.boards, placed=s.boards.placed),
+    "sweep": lambda s: marrow.simulate.sweeps(axes=["x"], max_rotation_deg=4, turn_step_deg=4),
+    "held": lambda s: marrow.simulate.hexapod(phantom=s.phantom, commands=s.sweep),
+    "photographs": lambda s: marrow.simulate.photograph(
+        arm=s.arm, phantom=s.phantom, fragment=s.held.fragment["neutral"], platform=s.held.platform["neutral"]
+    ),
+    "board": lambda s: SOURCE / "pipelines" / "calibration" / "board.yaml",
+    "beads": lambda s: marrow.simulate.bead_board(
+        board=str(s.board), width_px=512, height_px=512, pixel_mm=0.6, views=4
+    ),
+    # A robot holds two fragments that do not touch.
+    "apart": lambda s: marrow.simulate.fracture(bone=s.bone, rotation_deg=[3, -4, 5], translation_mm=[8, -6, -25]),
+    "robot": lambda s: marrow.robot.hexapod(phantom=s.apart),
+    "guide": lambda s: marrow.guide.begin(),
+    "stations": lambda s: marrow.robot.stations(
+        state=s.robot.state, camera=s.fine_cameras["frontal"], board=str(s.board), stations=4
+    ),
+    "fine_cameras": lambda s: marrow.camera.carm(width_px=512, height_px=512, pixel_mm=0.6),
+    "targets": lambda s: marrow.guide.target(view=s.stations.views, board=str(s.board)),
+    "later_states": lambda s: dict(zip(s.states, reversed(list(s.states.values())))),
+    "first_predicted": lambda s: marrow.track.predict(state=marrow.track.begin(start=s.start)).state,
+    "keyframes": lambda s: marrow.track.autoscoper(states=s.states),
+    "predicted": lambda s: marrow.track.predict(state=s.track).state,
+    "plan": lambda s: marrow.plan.locking(implant=s.nail.implant, pose=s.nailed.start, views=s.views, from_=[1, 0, 0]),
+    "pipelines": lambda s: SOURCE / "pipelines",
+}
 
 
 class Scene:
     """A femur in two parts, its CT in coarse voxels, two small X-ray images, and what is made of them."""
 
-    folder = SCRATCH / "options"
-
-    @functools.cached_property
-    def bone(self):
-        return marrow.simulate.femur(resolution_mm=3)
-
-    @functools.cached_property
-    def phantom(self):
-        return marrow.simulate.fracture(bone=self.bone, rotation_deg=[3, -4, 5], translation_mm=[4, -3, 5])
-
-    @functools.cached_property
-    def cluttered(self):
-        return marrow.simulate.clutter(phantom=self.phantom).phantom
-
-    @functools.cached_property
-    def cameras(self):
-        return marrow.camera.carm(width_px=160, height_px=160, pixel_mm=1.9)
-
-    @functools.cached_property
-    def volume(self):
-        return marrow.simulate.ct(phantom=self.phantom, spacing_mm=[1.6, 1.6, 2], range_mm=[0, 250])
-
-    @functools.cached_property
-    def views(self):
-        return marrow.simulate.fluoroscopy(phantom=self.phantom, cameras=self.cameras)
-
-    @functools.cached_property
-    def parts(self):
-        return marrow.simulate.truth(phantom=self.phantom)
+    def __getattr__(self, name):
+        if name not in MADE:
+            raise AttributeError(name)
+        setattr(self, name, MADE[name](self))
+        return getattr(self, name)
 
     @functools.cached_property
     def case(self):
         made = marrow.simulate.case(volume=self.volume, views=self.views, phantom=self.phantom, start="exact")
         return marrow.simulate.case_parts(case=made)
-
-    @property
-    def truth(self):
-        return self.parts.truths["distal"].matrix
-
-    @functools.cached_property
-    def start(self):
-        """Near the truth, with the fragment's axes."""
-        return marrow.initial.manual(
-            model=self.mesh, start=self.parts.starts["distal"], rotation_deg=[1, -1, 2], translation_mm=[1, 1, -1]
-        )
-
-    @property
-    def mesh(self):
-        return self.parts.models["distal"]
-
-    @property
-    def field(self):
-        return self.fields["distal"]
-
-    @functools.cached_property
-    def other_field(self):
-        """Another bone in the same place."""
-        return marrow.segment.threshold(volume=self.volume, seeds=self.case.seeds, threshold_hu=300)["distal"]
-
-    @functools.cached_property
-    def fields(self):
-        return marrow.segment.threshold(volume=self.volume, seeds=self.case.seeds)
-
-    @functools.cached_property
-    def coarse_mesh(self):
-        return marrow.mesh.simplify(mesh=self.mesh, triangles=600)
-
-    @functools.cached_property
-    def edges(self):
-        return marrow.edges.canny(self.views)
-
-    @functools.cached_property
-    def lines(self):
-        return marrow.shaft.hough_pairs(edges=self.edges, view=self.views)
-
-    @functools.cached_property
-    def outline(self):
-        return marrow.project.silhouette(model=self.coarse_mesh)
-
-    @functools.cached_property
-    def drr(self):
-        return marrow.project.joseph(volume=self.volume, field=self.field)
-
-    @functools.cached_property
-    def contour(self):
-        return marrow.similarity.contour_distance(
-            projector=self.outline, views=self.views, edges=self.edges, **self.with_model("similarity.contour_distance")
-        )
-
-    @functools.cached_property
-    def grey(self):
-        return marrow.similarity.gradient_correlation(projector=self.drr, views=self.views)
-
-    @functools.cached_property
-    def optimizer(self):
-        return marrow.optimizer.bobyqa()
-
-    @functools.cached_property
-    def found(self):
-        """A pose with a covariance, and the stages to it."""
-        return marrow.register.multiresolution(
-            cost=self.contour, optimizer=self.optimizer, start=self.start, **SHORT_SEARCH
-        )
-
-    @functools.cached_property
-    def sequence(self):
-        return marrow.register.sequence(
-            cost=self.contour, finer_cost=self.grey, optimizer=self.optimizer, start=self.start, **SHORT_SEARCH
-        )
-
-    @functools.cached_property
-    def both_outlines(self):
-        return {name: marrow.project.silhouette(model=mesh) for name, mesh in self.parts.models.items()}
-
-    @functools.cached_property
-    def both_drrs(self):
-        return {name: marrow.project.joseph(volume=self.volume, field=field) for name, field in self.fields.items()}
 
     @functools.cached_property
     def two_parts(self):
@@ -139,10 +104,6 @@ class Scene:
         return marrow.SignedField(numpy.minimum(large, small).astype("float32"), spacing_mm=(1, 1, 1))
 
     @functools.cached_property
-    def closed_mesh(self):
-        return marrow.mesh.marching_cubes(field=self.two_parts)
-
-    @functools.cached_property
     def placed(self):
         """The bone's surface where it is."""
         mesh = self.mesh
@@ -150,23 +111,10 @@ class Scene:
         return marrow.Mesh(points, mesh.triangles, frame="world")
 
     @functools.cached_property
-    def known(self):
-        """A pose known from elsewhere, with its covariance."""
-        return marrow.initial.skin_markers(model=self.mesh, landmarks=self.skin)
-
-    @functools.cached_property
-    def landmarks(self):
-        return marrow.simulate.landmarks(phantom=self.phantom, cameras=self.cameras)["distal"]
-
-    @functools.cached_property
     def track(self):
         state = marrow.track.begin(start=self.start)
         state = marrow.track.predict(state=state).state
         return marrow.track.filter(state=state, pose=self.found.pose).state
-
-    @functools.cached_property
-    def skin(self):
-        return marrow.simulate.skin_markers(phantom=self.phantom)["distal"]
 
     @functools.cached_property
     def reduced(self):
@@ -177,24 +125,12 @@ class Scene:
         return marrow.simulate.clutter(phantom=fracture).phantom
 
     @functools.cached_property
-    def nail(self):
-        return marrow.simulate.nail(resolution_mm=2)
-
-    @functools.cached_property
-    def nailed(self):
-        return marrow.simulate.nailing(phantom=self.reduced, implant=self.nail.implant)
-
-    @functools.cached_property
     def metal(self):
         """A CT with a screw, and its streaks."""
         samples = numpy.array(self.volume.array)
         samples[55:60, 28:34, 30:52] = 9000
         samples[55:60, 28:34, 44:47] = 2800
         return marrow.Volume(samples, spacing_mm=(1.6, 1.6, 2))
-
-    @functools.cached_property
-    def plated(self):
-        return marrow.simulate.clutter(phantom=self.phantom, plate="mild", fat="mild").phantom
 
     @functools.cached_property
     def knee(self):
@@ -221,70 +157,6 @@ class Scene:
         return path
 
     @functools.cached_property
-    def arm(self):
-        return marrow.simulate.camera_arm()
-
-    @functools.cached_property
-    def boards(self):
-        return marrow.simulate.chessboard(arm=self.arm, photographs=5)
-
-    @functools.cached_property
-    def photographed(self):
-        return marrow.camera.chessboard(boards=self.boards.boards, placed=self.boards.placed)
-
-    @functools.cached_property
-    def sweep(self):
-        return marrow.simulate.sweeps(axes=["x"], max_rotation_deg=4, turn_step_deg=4)
-
-    @functools.cached_property
-    def held(self):
-        return marrow.simulate.hexapod(phantom=self.phantom, commands=self.sweep)
-
-    @functools.cached_property
-    def photographs(self):
-        return marrow.simulate.photograph(
-            arm=self.arm,
-            phantom=self.phantom,
-            fragment=self.held.fragment["neutral"],
-            platform=self.held.platform["neutral"],
-        )
-
-    @property
-    def board(self):
-        return SOURCE / "pipelines" / "calibration" / "board.yaml"
-
-    @functools.cached_property
-    def beads(self):
-        return marrow.simulate.bead_board(board=str(self.board), width_px=512, height_px=512, pixel_mm=0.6, views=4)
-
-    @functools.cached_property
-    def apart(self):
-        """A robot holds two fragments that do not touch."""
-        return marrow.simulate.fracture(bone=self.bone, rotation_deg=[3, -4, 5], translation_mm=[8, -6, -25])
-
-    @functools.cached_property
-    def robot(self):
-        return marrow.robot.hexapod(phantom=self.apart)
-
-    @functools.cached_property
-    def guide(self):
-        return marrow.guide.begin()
-
-    @functools.cached_property
-    def stations(self):
-        return marrow.robot.stations(
-            state=self.robot.state, camera=self.fine_cameras["frontal"], board=str(self.board), stations=4
-        )
-
-    @functools.cached_property
-    def fine_cameras(self):
-        return marrow.camera.carm(width_px=512, height_px=512, pixel_mm=0.6)
-
-    @functools.cached_property
-    def targets(self):
-        return marrow.guide.target(view=self.stations.views, board=str(self.board))
-
-    @functools.cached_property
     def poses(self):
         """The pose in five frames."""
         poses = {}
@@ -303,40 +175,9 @@ class Scene:
         return states
 
     @functools.cached_property
-    def later_states(self):
-        return dict(zip(self.states, reversed(list(self.states.values()))))
-
-    @functools.cached_property
-    def first_predicted(self):
-        return marrow.track.predict(state=marrow.track.begin(start=self.start)).state
-
-    @functools.cached_property
-    def keyframes(self):
-        return marrow.track.autoscoper(states=self.states)
-
-    @functools.cached_property
-    def predicted(self):
-        return marrow.track.predict(state=self.track).state
-
-    @functools.cached_property
     def frames_metrics(self):
         truth = self.parts.truths["distal"]
         return {
             name: marrow.evaluate.pose_error(pose=pose, truth=truth, model=self.mesh)
             for name, pose in self.poses.items()
         }
-
-    @functools.cached_property
-    def plan(self):
-        return marrow.plan.locking(implant=self.nail.implant, pose=self.nailed.start, views=self.views, from_=[1, 0, 0])
-
-    @property
-    def pipelines(self):
-        return SOURCE / "pipelines"
-
-    @staticmethod
-    def ports_of(name):
-        return {port["name"] for port in marrow._core.node_info(name)["inputs"]}
-
-    def with_model(self, name):
-        return {"model": self.mesh} if "model" in self.ports_of(name) else {}

@@ -2,7 +2,7 @@
 """Values for options that cannot be guessed, or that count only together with others: by node.option, a function of the
 scene that gives sets of options. A key "in.NAME" is an input."""
 from calls_of_bones import GREY_VALUES
-from calls_of_programs import FORMATS
+from calls_of_files import FORMATS
 from files_of_scene import labels_of, network, points_network, slices_network, surface_of, written
 
 

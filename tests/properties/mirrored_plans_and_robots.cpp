@@ -1,12 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // What is said of a fracture and what is done about it: of the mirrored fracture, with the mirrored robot.
-#include <marrow/domain/c_arm.hpp>
-#include <marrow/domain/verdict.hpp>
-#include <opencv2/core.hpp>
 
-#include "marrow/toolbox/geometry/locking_plan.hpp"
-#include "marrow/toolbox/phantom/loft.hpp"
-#include "marrow/toolbox/robotics/guide_state.hpp"
 #include "marrow/toolbox/robotics/robot_state.hpp"
 #include "marrow/toolbox/track/track_state.hpp"
 #include "tests/properties/mirrored_values.hpp"
@@ -133,11 +127,10 @@ void locking() {
 
 void bodies() {
   const auto drawn = [](const geometry::Implant& implant, const Pose& pose, const std::string& side) {
-    return shipped::call("plan.bodies", {{"nail", shipped::item(implant.surface)},
-                                         {"pose", shipped::item(pose)},
-                                         {"plan", plan_of(implant, pose, side)}})
-        .at("models")
-        .as_list<Mesh>();
+    return shipped::output_list<Mesh>("plan.bodies", "models",
+                                      {{"nail", shipped::item(implant.surface)},
+                                       {"pose", shipped::item(pose)},
+                                       {"plan", plan_of(implant, pose, side)}});
   };
   const auto of = drawn(rod(), pose_of_rod(), "left"), found = drawn(mirrored(rod()), mirrored(pose_of_rod()), "right");
   ASSERT_EQ(found.names(), of.names());
@@ -208,9 +201,8 @@ void move() {
 void scene() {
   const auto [right, left] = both_moved();
   const auto now = [](const Phantom& phantom, const shipped::Outputs& state) {
-    return shipped::call("robot.scene", {{"phantom", shipped::item(phantom)}, {"state", state.at("state")}})
-        .at("phantom")
-        .as<Phantom>();
+    return shipped::output<Phantom>("robot.scene", "phantom",
+                                    {{"phantom", shipped::item(phantom)}, {"state", state.at("state")}});
   };
   const Phantom found = now(mirrored(left_fracture()), right), of = now(left_fracture(), left);
   for (std::size_t i = 0; i < of.fragments.size(); ++i)
@@ -264,11 +256,10 @@ void open_loop() {
     targets.add("station" + std::to_string(i), target);
   }
   const auto motion = [](const Phantom& phantom, const List<Pose>& hands, const List<Pose>& targets) {
-    return shipped::call("guide.open_loop", {{"poses", shipped::list(poses_of(phantom), "fragment")},
-                                             {"hands", shipped::list(hands, "station")},
-                                             {"targets", shipped::list(targets, "station")}})
-        .at("motion")
-        .as<Pose>()
+    return shipped::output<Pose>("guide.open_loop", "motion",
+                                 {{"poses", shipped::list(poses_of(phantom), "fragment")},
+                                  {"hands", shipped::list(hands, "station")},
+                                  {"targets", shipped::list(targets, "station")}})
         .world_from_model;
   };
   expect_mirrored(motion(mirrored(left_fracture()), mirrored(hands), mirrored(targets)),
@@ -277,9 +268,7 @@ void open_loop() {
 
 void way() {
   const auto states = [](const List<Pose>& poses) {
-    return shipped::call("guide.way", {{"poses", shipped::list(poses, "pass")}})
-        .at("trajectory")
-        .as<track::Trajectory>()
+    return shipped::output<track::Trajectory>("guide.way", "trajectory", {{"poses", shipped::list(poses, "pass")}})
         .states;
   };
   const auto of = states(poses_of(left_fracture())), found = states(mirrored(poses_of(left_fracture())));

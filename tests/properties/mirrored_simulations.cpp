@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 // The nodes that simulate: of a mirrored bone, moved in the mirrored way.
-#include <marrow/domain/functions.hpp>
-#include <opencv2/core.hpp>
 
 #include "marrow/simulate/posture.hpp"
 #include "tests/properties/mirrored_values.hpp"
@@ -11,18 +9,12 @@ namespace {
 
 using namespace marrow;
 using phantom::Posture;
-using shipped::Options;
-
-template <class T>
-T made_by(const std::string& node, const shipped::Inputs& inputs, const std::string& port,
-          const Options& options = {}) {
-  return shipped::call(node, inputs, options).at(port).as<T>();
-}
+using shipped::Options, shipped::output, shipped::output_list;
 
 void femur() {
   const Bone& left = left_femur();
   const Bone right =
-      made_by<Bone>("simulate.femur", {}, "bone", {{"resolution_mm", 2.0}, {"side", std::string("right")}});
+      output<Bone>("simulate.femur", "bone", {}, {{"resolution_mm", 2.0}, {"side", std::string("right")}});
   // The triangles are others, as the cubes are not mirrored.
   const auto compare = [](const Mesh& found, const Mesh& of) {
     EXPECT_NEAR(enclosed_volume_mm3(found) / enclosed_volume_mm3(of), 1, 1e-3);
@@ -47,16 +39,16 @@ void expect_mirrored_phantom(const Phantom& found, const Phantom& of) {
 }
 
 void fracture() {
-  expect_mirrored_phantom(made_by<Phantom>("simulate.fracture", {{"bone", shipped::item(mirrored(left_femur()))}},
-                                           "phantom", fracture_options(true)),
+  expect_mirrored_phantom(output<Phantom>("simulate.fracture", "phantom",
+                                          {{"bone", shipped::item(mirrored(left_femur()))}}, fracture_options(true)),
                           left_fracture());
 }
 
 void whole() {
   const Eigen::Vector3d turn(3, -7, 20), shift(4, -5, 6);
   const auto moved = [](const Bone& bone, const Eigen::Vector3d& turn, const Eigen::Vector3d& shift) {
-    return made_by<Phantom>("simulate.whole", {{"bone", shipped::item(bone)}}, "phantom",
-                            {{"rotation_deg", list_of(turn)}, {"translation_mm", list_of(shift)}});
+    return output<Phantom>("simulate.whole", "phantom", {{"bone", shipped::item(bone)}},
+                           {{"rotation_deg", list_of(turn)}, {"translation_mm", list_of(shift)}});
   };
   expect_mirrored_phantom(moved(mirrored(left_femur()), mirrored_turn(turn), mirrored(shift)),
                           moved(left_femur(), turn, shift));
@@ -77,29 +69,25 @@ void expect_mirrored_postures(const List<Posture>& found, const List<Posture>& o
 void bone_motion() {
   const Eigen::Vector3d turn(6, 4, 60), shift(4, 3, 6);
   const auto postures = [](const Phantom& phantom, const Eigen::Vector3d& turn, const Eigen::Vector3d& shift) {
-    return shipped::call(
-               "simulate.bone_motion", {{"phantom", shipped::item(phantom)}},
-               {{"frames", std::int64_t(9)}, {"rotation_deg", list_of(turn)}, {"translation_mm", list_of(shift)}})
-        .at("postures")
-        .as_list<Posture>();
+    return output_list<Posture>(
+        "simulate.bone_motion", "postures", {{"phantom", shipped::item(phantom)}},
+        {{"frames", std::int64_t(9)}, {"rotation_deg", list_of(turn)}, {"translation_mm", list_of(shift)}});
   };
   expect_mirrored_postures(postures(mirrored(left_fracture()), mirrored_turn(turn), mirrored(shift)),
                            postures(left_fracture(), turn, shift));
 }
 
 List<Posture> knee_postures(const ClutteredPhantom& phantom) {
-  return shipped::call("simulate.knee_motion", {{"phantom", shipped::item(phantom)}},
-                       {{"frames", std::int64_t(9)}, {"frame_rate_hz", 10.0}, {"crossing", true}})
-      .at("postures")
-      .as_list<Posture>();
+  return output_list<Posture>("simulate.knee_motion", "postures", {{"phantom", shipped::item(phantom)}},
+                              {{"frames", std::int64_t(9)}, {"frame_rate_hz", 10.0}, {"crossing", true}});
 }
 
 void knee_motion() { expect_mirrored_postures(knee_postures(mirrored(left_leg())), knee_postures(left_leg())); }
 
 void clutter() {
   const auto with_knee = [](const Phantom& phantom) {
-    return made_by<ClutteredPhantom>("simulate.clutter", {{"phantom", shipped::item(phantom)}}, "phantom",
-                                     {{"knee", "usual"}});
+    return output<ClutteredPhantom>("simulate.clutter", "phantom", {{"phantom", shipped::item(phantom)}},
+                                    {{"knee", "usual"}});
   };
   const ClutteredPhantom found = with_knee(mirrored(left_fracture())), of = with_knee(left_fracture());
   ASSERT_EQ(found.bodies.size(), of.bodies.size());
@@ -142,11 +130,11 @@ void bones() {
 }
 
 void nailing() {
-  const auto implant = made_by<geometry::Implant>("simulate.nail", {}, "implant", {{"resolution_mm", 1.0}});
+  const auto implant = output<geometry::Implant>("simulate.nail", "implant", {}, {{"resolution_mm", 1.0}});
   const auto nailed = [](const ClutteredPhantom& phantom, const geometry::Implant& implant) {
-    return made_by<Truth>("simulate.nailing",
-                          {{"phantom", shipped::item(phantom)}, {"implant", shipped::item(implant)}}, "truth",
-                          {{"turn_deg", 0.0}, {"shift_mm", 0.0}})
+    return output<Truth>("simulate.nailing", "truth",
+                         {{"phantom", shipped::item(phantom)}, {"implant", shipped::item(implant)}},
+                         {{"turn_deg", 0.0}, {"shift_mm", 0.0}})
         .world_from_model;
   };
   expect_mirrored(nailed(mirrored(left_leg()), mirrored(implant)), nailed(left_leg(), implant), 1e-6, "the nail");
@@ -162,16 +150,14 @@ void hexapod_below_fragment() {
   }
   const auto positions = [](const Phantom& phantom, const List<Pose>& told, const Eigen::Vector3d& at,
                             const Eigen::Vector3d& stand) {
-    return shipped::call("simulate.hexapod",
-                         {{"phantom", shipped::item(phantom)}, {"commands", shipped::list(told, "position")}},
-                         {{"fragment_at_mm", list_of(at)},
-                          {"stand_deg", list_of(stand)},
-                          {"leg_sd_mm", 0.0},
-                          {"joint_sd_mm", 0.0},
-                          {"mount_sd_deg", 0.0},
-                          {"mount_sd_mm", 0.0}})
-        .at("fragment")
-        .as_list<Truth>();
+    return output_list<Truth>("simulate.hexapod", "fragment",
+                              {{"phantom", shipped::item(phantom)}, {"commands", shipped::list(told, "position")}},
+                              {{"fragment_at_mm", list_of(at)},
+                               {"stand_deg", list_of(stand)},
+                               {"leg_sd_mm", 0.0},
+                               {"joint_sd_mm", 0.0},
+                               {"mount_sd_deg", 0.0},
+                               {"mount_sd_mm", 0.0}});
   };
   const auto found = positions(mirrored(left_fracture()), mirrored(commands), mirrored(at), mirrored_turn(stand)),
              of = positions(left_fracture(), commands, at, stand);
@@ -180,15 +166,13 @@ void hexapod_below_fragment() {
 }
 
 Camera camera() {
-  return shipped::call("camera.carm", {},
-                       {{"names", std::vector<std::string>{"oblique"}},
-                        {"alpha_deg", std::vector<double>{10}},
-                        {"beta_deg", std::vector<double>{35}},
-                        {"width_px", std::int64_t(128)},
-                        {"height_px", std::int64_t(160)},
-                        {"pixel_mm", 2.0}})
-      .at("camera")
-      .as_list<Camera>()[0];
+  return output_list<Camera>("camera.carm", "camera", {},
+                             {{"names", std::vector<std::string>{"oblique"}},
+                              {"alpha_deg", std::vector<double>{10}},
+                              {"beta_deg", std::vector<double>{35}},
+                              {"width_px", std::int64_t(128)},
+                              {"height_px", std::int64_t(160)},
+                              {"pixel_mm", 2.0}})[0];
 }
 
 /// The flipped image differs by rounding alone.
@@ -213,8 +197,8 @@ void expect_mirrored_image(const std::string& node, const T& phantom) {
 template <class T>
 void expect_mirrored_volume(const std::string& node, const T& phantom) {
   const auto volume = [&](const T& given) {
-    return made_by<Volume>(node, {{"phantom", shipped::item(given)}}, "volume",
-                           {{"noise_hu", 0.0}, {"spacing_mm", std::vector<double>{2, 2, 3}}});
+    return output<Volume>(node, "volume", {{"phantom", shipped::item(given)}},
+                          {{"noise_hu", 0.0}, {"spacing_mm", std::vector<double>{2, 2, 3}}});
   };
   const Volume of = volume(phantom), found = volume(mirrored(phantom));
   double off = 0, unmirrored = 0, count = 0;
@@ -234,7 +218,7 @@ void expect_mirrored_volume(const std::string& node, const T& phantom) {
 }  // namespace
 
 const Bone& left_femur() {
-  static const Bone made = made_by<Bone>("simulate.femur", {}, "bone", {{"resolution_mm", 2.0}});
+  static const Bone made = output<Bone>("simulate.femur", "bone", {}, {{"resolution_mm", 2.0}});
   return made;
 }
 
@@ -253,8 +237,8 @@ Options fracture_options(bool is_mirrored) {
 }
 
 const Phantom& left_fracture() {
-  static const Phantom made = made_by<Phantom>("simulate.fracture", {{"bone", shipped::item(left_femur())}}, "phantom",
-                                               fracture_options(false));
+  static const Phantom made =
+      output<Phantom>("simulate.fracture", "phantom", {{"bone", shipped::item(left_femur())}}, fracture_options(false));
   return made;
 }
 
@@ -264,7 +248,7 @@ const ClutteredPhantom& left_leg() {
                                      {{"rotation_deg", std::vector<double>{2, 3, 4}},
                                       {"translation_mm", std::vector<double>{5, -2, 3}}})
                            .at("phantom");
-    return made_by<ClutteredPhantom>("simulate.clutter", {{"phantom", whole}}, "phantom", {{"knee", "mild"}});
+    return output<ClutteredPhantom>("simulate.clutter", "phantom", {{"phantom", whole}}, {{"knee", "mild"}});
   }();
   return made;
 }

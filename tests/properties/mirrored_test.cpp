@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // A left and a right limb are mirror images. Each node of these kinds gives for the mirrored patient the mirrored
 // answer, and the same medial, varus or internal. A new node is tested, or is named here with the reason.
-#include <algorithm>
-#include <marrow/runtime/plugins/catalogue.hpp>
 #include <set>
 
 #include "tests/properties/mirrored_values.hpp"

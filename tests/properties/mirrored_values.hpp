@@ -4,12 +4,6 @@
 // the definitions of the values are used, no node.
 #include <gtest/gtest.h>
 
-#include <Eigen/Geometry>
-#include <functional>
-#include <map>
-#include <string>
-#include <vector>
-
 #include "marrow/toolbox/geometry/implant.hpp"
 #include "marrow/toolbox/phantom/phantom.hpp"
 #include "shipped.hpp"

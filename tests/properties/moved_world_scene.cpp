@@ -1,10 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tests/properties/moved_world_scene.hpp"
 
-#include <algorithm>
-#include <cmath>
-#include <marrow/domain/c_arm.hpp>
-
 namespace moved_world {
 namespace {
 
@@ -77,7 +73,7 @@ View view_of(const std::string& name, const marrow::Camera& camera, const marrow
 
 /// To 1/64 px, so that a shift by whole pixels changes no digit of a position; none in the parts that are cut off.
 EdgeMap edges_of(const View& view) {
-  EdgeMap edges = shipped::call("edges.canny", {{"view", shipped::item(view)}}).at("edges").as<EdgeMap>();
+  EdgeMap edges = shipped::output<EdgeMap>("edges.canny", "edges", {{"view", shipped::item(view)}});
   constexpr float kRim_px = 40;
   std::erase_if(edges.pixels, [&](const marrow::EdgePixel& edge) {
     return std::min({edge.u_px, edge.v_px, kWidth_px - edge.u_px, kHeight_px - edge.v_px}) < kRim_px;
@@ -174,8 +170,7 @@ marrow::Value changed_list(const List<T>& values, const Change& change, const st
 struct Base {
   marrow::SignedField field = moved_world::field();
   marrow::Volume volume = volume_of(field);
-  marrow::Mesh mesh =
-      shipped::call("mesh.marching_cubes", {{"field", shipped::item(field)}}).at("mesh").as<marrow::Mesh>();
+  marrow::Mesh mesh = shipped::output<marrow::Mesh>("mesh.marching_cubes", "mesh", {{"field", shipped::item(field)}});
   List<View> views;
   List<EdgeMap> edges;
   List<marrow::ShaftLines> lines;

@@ -4,9 +4,6 @@
 // follows from the definitions of the frames alone. A new node is tested by itself, or is named here with the reason.
 #include <gtest/gtest.h>
 
-#include <algorithm>
-#include <limits>
-#include <map>
 #include <set>
 
 #include "tests/properties/moved_world_scene.hpp"
@@ -156,7 +153,7 @@ Numbers numbers_of(const Value& value, const Change& change) {
   take.operator()<marrow::track::TrackState>();
   take.operator()<marrow::track::AutoscoperTrack>();
   take.operator()<marrow::track::Trajectory>();
-  EXPECT_TRUE(is_known) << "add the type '" << value.type.id << "' to moved_world_values.hpp";
+  EXPECT_TRUE(is_known) << "add the type '" << value.type.id << "' to moved_world_scene.hpp";
   return numbers;
 }
 

@@ -62,9 +62,8 @@ class Display(PackageCase):
         self.assertNotIn('src="http', text)
         curves = result["profiles"]["distal"]._repr_html_()
         self.assertEqual(curves.count("<polyline"), 6)
-        self.assertEqual(
-            curves.count("stroke-dasharray"), 6 if result["profiles"]["distal"].profiles[0].truth is not None else 0
-        )
+        is_known = result["profiles"]["distal"].profiles[0].truth is not None
+        self.assertEqual(curves.count("stroke-dasharray"), 6 if is_known else 0)
 
     def test_figures_have_a_row_each(self):
         table = marrow.display.figures_table({"start": {"mm": 3.0, "deg": 1.0}, "final": {"mm": 0.5, "px": 2.0}})

@@ -87,9 +87,8 @@ class Errors(PackageCase):
             marrow.Pipeline(FEMUR, case=".").set("case.path", None)
 
     def path_after(self, key, text):
-        return yaml.safe_load(marrow.Pipeline(FEMUR, case=".").set(key, text).resolved())["nodes"]["case"]["with"][
-            "path"
-        ]
+        resolved = yaml.safe_load(marrow.Pipeline(FEMUR, case=".").set(key, text).resolved())
+        return resolved["nodes"]["case"]["with"]["path"]
 
     def test_changes_that_must_fit_each_other_are_made_together(self):
         pipeline = marrow.Pipeline(FEMUR, case=".")

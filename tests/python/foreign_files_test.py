@@ -4,12 +4,10 @@ each whether it is read with the values that the other program reads, or why it 
 damaged, and each refusal must be one of those below."""
 import concurrent.futures
 import fnmatch
-import pathlib
 
 import foreign_found
-import foreign_vtk
 import foreign_written
-from foreign_files import row_of
+from foreign_found import row_of
 from harness.package import Case, main
 
 SOURCES = (
@@ -22,7 +20,7 @@ SOURCES = (
     foreign_written.by_nibabel,
     foreign_written.by_tifffile,
     foreign_written.by_pillow,
-    foreign_vtk.by_vtk,
+    foreign_written.by_vtk,
 )
 # Files that are cut off, that lack what every such file has, or that contradict themselves: only of these may a message
 # say that they are damaged.
@@ -114,9 +112,7 @@ class ForeignFiles(Case):
             print("skipped, not installed here: " + name)
         equal = sum(text.startswith("read and equal") for text, _ in rows)
         print("%d files: %d read and equal, %d refused" % (len(rows), equal, len(rows) - equal))
-        faults = [
-            pathlib.Path(sample.path).name + ": " + text for sample, (text, is_fault) in zip(samples, rows) if is_fault
-        ]
+        faults = ["%s: %s" % (one.path.name, text) for one, (text, is_fault) in zip(samples, rows) if is_fault]
         self.assertEqual(faults, [])
         if not samples:
             self.skipTest("none of these programs is installed here")

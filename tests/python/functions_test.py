@@ -5,9 +5,8 @@ import threading
 import time
 
 import numpy
-from function_nodes import NEAR
+from written_nodes import NEAR, Written, camera, view
 from harness.package import interrupt, main, marrow, small_case
-from written_nodes import Written, camera, view
 
 _made = {}
 
@@ -36,9 +35,8 @@ def moved(matrix, by_mm):
 def ball(radius_mm=20):
     z, y, x = numpy.mgrid[-32:32, -32:32, -32:32] + 0.5
     inside = numpy.sqrt(x**2 + y**2 + z**2) < radius_mm
-    return marrow.Volume(
-        numpy.where(inside, 0, -1000).astype("float32"), spacing_mm=(1, 1, 1), origin_mm=(-31.5, -31.5, -31.5)
-    )
+    values = numpy.where(inside, 0, -1000).astype("float32")
+    return marrow.Volume(values, spacing_mm=(1, 1, 1), origin_mm=(-31.5, -31.5, -31.5))
 
 
 class Costs(Written):

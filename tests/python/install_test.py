@@ -25,17 +25,15 @@ print(len(marrow.edges.steepest_python(step)))
 
 class Install(Case):
     def test_it_may_be_moved(self):
-        subprocess.run(
-            ["cmake", "--install", BUILD, "--prefix", self.scratch / "first"], check=True, stdout=subprocess.DEVNULL
-        )
+        install = ["cmake", "--install", BUILD, "--prefix", self.scratch / "first"]
+        subprocess.run(install, check=True, stdout=subprocess.DEVNULL)
         (self.scratch / "first").rename(self.scratch / "moved")
         packages = self.scratch / "moved" / "lib" / "python3" / "dist-packages"
         environment = {key: value for key, value in os.environ.items() if not key.startswith("MARROW_")}
         environment.update(PYTHONPATH=str(packages), MARROW_CACHE=str(self.scratch / "cache"))
         environment["MARROW_PLUGIN_PATH"] = str(SOURCE / "docs" / "example-plugin")
-        done = subprocess.run(
-            [sys.executable, "-c", CODE], env=environment, cwd=self.scratch, capture_output=True, text=True
-        )
+        how = {"env": environment, "cwd": self.scratch, "capture_output": True, "text": True}
+        done = subprocess.run([sys.executable, "-c", CODE], **how)
         self.assertEqual(done.returncode, 0, done.stderr)
         files = done.stdout.splitlines()
         for file, end in zip(files, ("marrow/__init__.py", "libmarrow.so.0", "bin/marrow")):

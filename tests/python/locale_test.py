@@ -29,9 +29,8 @@ fragments:
 class Locale(Case):
     def setUp(self):
         super().setUp()
-        made = subprocess.run(
-            ["localedef", "-i", "de_DE", "-f", "UTF-8", str(self.scratch / "de_DE.UTF-8")], capture_output=True
-        )
+        command = ["localedef", "-i", "de_DE", "-f", "UTF-8", str(self.scratch / "de_DE.UTF-8")]
+        made = subprocess.run(command, capture_output=True)
         os.environ["LOCPATH"] = str(self.scratch)
         self.addCleanup(os.environ.pop, "LOCPATH")
         self.is_there = made.returncode == 0

@@ -1,5 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Calls of nodes written in Python: what they get, what they may return, and that results repeat."""
+import gc
+import os
+import pathlib
+
 import numpy
 from all_values import values
 from harness.package import main, marrow
@@ -145,9 +149,8 @@ def calls(field: Annotated[marrow.SignedField, "field"]) -> Annotated[marrow.Mes
         )
         z, y, x = numpy.mgrid[-30:31, -30:31, -30:31]
         ball = marrow.SignedField(numpy.sqrt(x**2 + y**2 + z**2) - 20, spacing_mm=(1, 1, 1))
-        self.assertTrue(
-            numpy.array_equal(marrow.own.calls(ball).vertices_mm, marrow.mesh.marching_cubes(ball).vertices_mm)
-        )
+        found, wanted = marrow.own.calls(ball), marrow.mesh.marching_cubes(ball)
+        self.assertTrue(numpy.array_equal(found.vertices_mm, wanted.vertices_mm))
 
     def test_a_process_stays_for_the_next_call(self):
         file = self.plugin(
@@ -180,9 +183,7 @@ def hashed(view: Annotated[marrow.View, "view"], *, context: marrow.Context) -> 
 """
         )
         views = {"item%d" % i: view(i) for i in range(6)}
-        results = [
-            [dict(one.values) for one in marrow.own.hash.using(threads=threads)(views).values()] for threads in (1, 2)
-        ]
+        results = [[dict(one.values) for one in marrow.own.hash.using(threads=n)(views).values()] for n in (1, 2)]
         self.assertEqual(results[0], results[1])
         again = {str(dict(marrow.own.hash(view(1)).values)) for _ in range(100)}
         self.assertEqual(len(again), 1)
@@ -213,6 +214,59 @@ def add(a: Annotated[marrow.Metrics, "first"], b: Annotated[marrow.Metrics, "sec
         for cell in compared.cells:
             values.setdefault(cell["variant"], []).append(cell["sum.value"])
         self.assertEqual({name: sorted(found) for name, found in values.items()}, {"cpp": [2, 4], "python": [2, 4]})
+
+
+PLACES = """
+import os
+
+@marrow.node("own.place", summary="where the samples are")
+def place(volume: Annotated[marrow.Volume, "ct"], view: Annotated[Optional[marrow.View], "view"] = None) -> Annotated[
+        marrow.Metrics, marrow.named("figures")]:
+    address = volume.array.ctypes.data
+    for line in open("/proc/self/maps"):
+        begin, end = (int(part, 16) for part in line.split()[0].split("-"))
+        if begin <= address < end:
+            inode, shared = int(line.split()[4]), "s" in line.split()[1] and "w" not in line.split()[1]
+    return marrow.Metrics({"process": os.getpid(), "address": address, "inode": inode, "shared": shared,
+                           "sum": float(volume.array[3, 2, 1]), "aligned": volume.array.flags.aligned})
+"""
+
+
+def shared_megabytes():
+    """What this process holds in memory without a name."""
+    total = 0
+    for entry in pathlib.Path("/proc/self/fd").iterdir():
+        try:
+            if "memfd:marrow" in os.readlink(entry):
+                total += os.stat(entry).st_size / 1e6
+        except OSError:
+            pass
+    return total
+
+
+class Shared(Written):
+    """Inputs are packed once and mapped, not copied for each call."""
+
+    def test_samples_are_mapped_once(self):
+        file = self.plugin(PLACES)
+        samples = numpy.arange(100 * 200 * 200, dtype="float32").reshape(100, 200, 200)  # 16 MB
+        volume = marrow.Volume(samples, spacing_mm=(1, 1, 1))
+        found = [marrow.own.place(volume, view(seed)) for seed in range(4)]
+        self.assertEqual(len({(one["process"], one["address"], one["inode"]) for one in found}), 1)
+        self.assertEqual((found[0]["shared"], found[0]["aligned"]), (1, 1))
+        self.assertEqual(found[0]["sum"], samples[3, 2, 1])
+        self.assertAlmostEqual(shared_megabytes(), 16, delta=1)
+        views = {"item%d" % seed: view(seed) for seed in range(8)}
+        of_two = marrow.own.place.using(threads=2)(volume, views)
+        self.assertEqual({one["inode"] for one in of_two.values()}, {found[0]["inode"]}, "all processes map the same")
+        self.assertLessEqual(len(processes(file)), 2)
+
+    def test_memory_is_given_back(self):
+        self.plugin(PLACES)
+        for size in (100, 120, 140):
+            marrow.own.place(marrow.Volume(numpy.ones((size, 200, 200), "float32"), spacing_mm=(1, 1, 1)))
+            gc.collect()
+            self.assertLess(shared_megabytes(), 0.17 * size, "only the last one is there")
 
 
 if __name__ == "__main__":

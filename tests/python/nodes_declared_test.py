@@ -7,7 +7,7 @@ import shutil
 import subprocess
 
 import numpy
-from harness.package import BUILD, SOURCE, main, marrow, small_case
+from harness.package import BUILD, MARROW, SOURCE, main, marrow, small_case
 from written_nodes import HEAD, Written, view
 
 EXAMPLE = SOURCE / "docs" / "example-plugin"
@@ -91,13 +91,9 @@ def all_of_it(
         )
         info = marrow._core.node_info("own.all")
         ports = [(port["name"], port["type"], port["optional"], port["axis"]) for port in info["inputs"]]
-        self.assertEqual(
-            ports, [("mesh", "mesh", False, ""), ("views", "view", True, "view"), ("from", "pose", True, "")]
-        )
+        self.assertEqual(ports, [("mesh", "mesh", 0, ""), ("views", "view", 1, "view"), ("from", "pose", 1, "")])
         ports = [(port["name"], port["type"], port["optional"], port["axis"]) for port in info["outputs"]]
-        self.assertEqual(
-            ports, [("first", "mesh", False, ""), ("second", "pose", True, ""), ("many", "view", True, "view")]
-        )
+        self.assertEqual(ports, [("first", "mesh", 0, ""), ("second", "pose", 1, ""), ("many", "view", 1, "view")])
         self.assertTrue(info["random"])
         options = {option["name"]: option for option in info["options"]}
         types = {name: option["type"] for name, option in options.items()}
@@ -191,6 +187,113 @@ def own(view: marrow.View, *, low: Annotated[float, "low"] = 3) -> marrow.EdgeMa
             self.assertIn("it did not say what it holds within 20 s of being imported", self.program("doctor", code=1))
             imports.append(len(begun.read_text()))
         self.assertEqual(imports[0], imports[1], "it is not imported again")
+
+
+THEIRS = "import sys\nsys.path.insert(0, %r)\n"
+
+
+class Trust(Written):
+    """Of a module that others could change, nothing runs."""
+
+    def setUp(self):
+        super().setUp()
+        self.open = self.scratch / "open"
+        self.open.mkdir()
+        self.mark = self.scratch / "mark"
+        (self.open / "theirs.py").write_text("open(%r, 'w').close()\n" % str(self.mark))
+        self.open.chmod(0o777)
+        os.environ.pop("MARROW_TRUST_ALL_PLUGINS", None)
+        self.addCleanup(os.environ.pop, "MARROW_TRUST_ALL_PLUGINS", None)
+
+    def untrusted(self, path):
+        return (
+            "cannot be loaded, because it needs '%s', which is not trusted, because others may write to '%s' (owner "
+            % (path, self.open)
+        )
+
+    def doctor(self):
+        return subprocess.run([str(MARROW), "doctor"], capture_output=True, text=True, cwd=self.scratch).stdout
+
+    def test_what_the_file_imports(self):
+        self.node(THEIRS % str(self.open) + "import theirs\nVALUE = 5")
+        self.assertIn("module 'theirs' " + self.untrusted(self.open / "theirs.py"), self.doctor())
+        self.assertFalse(self.mark.exists())
+        self.open.chmod(0o755)  # as the message says
+        self.assertEqual(marrow.own.value(view())["value"], 5)
+        self.assertTrue(self.mark.exists())
+        self.mark.unlink()
+        self.open.chmod(0o777)
+        self.assertIn(self.untrusted(self.open / "theirs.py"), self.doctor(), "a kept description is no trust")
+        self.assertFalse(self.mark.exists())
+        os.environ["MARROW_TRUST_ALL_PLUGINS"] = "1"
+        marrow.find_plugins_again()
+        self.assertEqual(marrow.own.value(view())["value"], 5)
+
+    def test_an_import_whose_error_is_caught(self):
+        self.node(THEIRS % str(self.open) + "try:\n    import theirs\nexcept ImportError:\n    VALUE = 5\n")
+        self.assertIn("module 'theirs' " + self.untrusted(self.open / "theirs.py"), self.doctor())
+        self.assertFalse(self.mark.exists())
+
+    def test_an_import_in_a_call(self):
+        self.node(THEIRS % str(self.open), "import theirs\nVALUE = 5")
+        said = str(self.fault_of(lambda: marrow.own.value(view()), marrow.RunError))
+        self.assertIn("module 'theirs' " + self.untrusted(self.open / "theirs.py"), said)
+        self.assertFalse(self.mark.exists())
+
+    def test_a_folder_of_the_search_path(self):
+        """The interpreter itself runs sitecustomize.py of such a folder."""
+        (self.open / "theirs.py").rename(self.open / "sitecustomize.py")
+        with self.with_variables(PYTHONPATH=self.open):
+            self.node("VALUE = 5")
+            self.assertIn(self.untrusted(self.open), self.doctor())
+            self.assertFalse(self.mark.exists())
+
+
+MEASURES = """
+@marrow.node("evaluate.own", summary="two figures")
+def own(view: Annotated[marrow.View, "view"], *, also: Annotated[str, "a further figure"] = "") -> Annotated[
+        marrow.Metrics, marrow.named("metrics"), marrow.figures("mean_mm", "*.median_px")]:
+    figures = {"mean_mm": 1.0, view.name + ".median_px": 2.0}
+    return marrow.Metrics({**figures, **({also: 3.0} if also else {})})
+"""
+
+
+class Figures(Written):
+    """The names of figures that a node declares, in C++ or in Python."""
+
+    def test_a_node_in_python_says_what_it_makes(self):
+        self.plugin(MEASURES)
+        described = json.loads(self.program("inspect", "evaluate.own", "--json"))
+        self.assertEqual([output["figures"] for output in described["outputs"]], [["mean_mm", "*.median_px"]])
+        self.assertIn("figures: mean_mm, *.median_px\n", self.program("inspect", "evaluate.own"))
+
+    def test_another_figure_is_a_fault(self):
+        self.plugin(MEASURES)
+        made = marrow.evaluate.own(view())
+        self.assertEqual((made["mean_mm"], made["frontal.median_px"]), (1, 2))
+        said = (
+            "it gave an output 'metrics' that cannot be: the figure 'mean_m' is not among those that its declaration "
+        )
+        self.refuses((said + "names", lambda: marrow.evaluate.own(view(), also="mean_m")), kind=marrow.RunError)
+
+    def test_they_belong_to_figures(self):
+        self.plugin(
+            """
+@marrow.node("edges.own", summary="no figures")
+def own(view: Annotated[marrow.View, "view"]) -> Annotated[marrow.EdgeMap, marrow.figures("mean_mm")]:
+    return marrow.EdgeMap(numpy.zeros((0, 5)), width_px=1, height_px=1)
+"""
+        )
+        self.assertIn("marrow.figures", self.program("doctor", code=1))
+
+    def test_each_shipped_output_of_figures_says_which(self):
+        """So that an experiment that asks for another one is refused before it runs."""
+        nodes = json.loads(self.program("list", "--json"))
+        outputs = [(node["name"], out) for node in nodes for out in node["outputs"] if out["type"] == "metrics"]
+        shipped = [(name, output) for name, output in outputs if not name.startswith(("test.", "judge.", "parse."))]
+        self.assertGreater(len(shipped), 20)
+        without = [name for name, output in shipped if not output["figures"]]
+        self.assertEqual(without, ["run.program_metrics"], "its figures are those of the program that it runs")
 
 
 if __name__ == "__main__":

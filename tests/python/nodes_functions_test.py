@@ -1,9 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Costs and projectors written in Python, decorators of them, and nodes that take them."""
 import numpy
-from function_nodes import DECORATORS, NEAR, PROJECTORS, FunctionNodes
+from written_nodes import DECORATORS, NEAR, PROJECTORS, FunctionNodes, Written, camera, view
 from harness.package import SOURCE, interrupt, main, marrow, small_case
-from written_nodes import Written, camera, view
 
 PIPELINE = """marrow: 1
 nodes:
@@ -115,10 +114,8 @@ class Decorators(FunctionNodes):
         optimizer = marrow.optimizer.nelder_mead()
         start = marrow.Pose(case.truth["distal"].matrix)
         arguments = {"optimizer": optimizer, "start": start, "pixel_step": [16, 8, 8], "scan_rotation_deg": 0}
-        found = [
-            marrow.register.multiresolution(cost=cost, **arguments).pose
-            for cost in (plain, marrow.similarity.line(plain))
-        ]
+        costs = (plain, marrow.similarity.line(plain))
+        found = [marrow.register.multiresolution(cost=cost, **arguments).pose for cost in costs]
         self.assertEqual(found[0].matrix.tolist(), found[1].matrix.tolist())
         self.assertIsNotNone(found[0].covariance)
         self.assertLess(numpy.abs(found[0].covariance / found[1].covariance - 1).max(), 1e-6)

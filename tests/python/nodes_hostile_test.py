@@ -141,9 +141,8 @@ class Hostile(Written):
         self.assertEqual(self.does("", given)["sum"], right)
 
     def test_what_a_node_says_is_understood(self):
-        self.assertIn(
-            "progress: expected a number from 0 to 1, got nan", self.failure("context.progress(float('nan'))")
-        )
+        said = self.failure("context.progress(float('nan'))")
+        self.assertIn("progress: expected a number from 0 to 1, got nan", said)
         told = []
         self.does("context.warn('the folder caf' + chr(0xdce9) + ' is new')", told=told)
         self.assertIn(r"the folder caf\xe9 is new", [event["text"] for event in told])

@@ -7,9 +7,8 @@ import threading
 import time
 
 import numpy
-from function_nodes import FunctionNodes
+from written_nodes import FunctionNodes, Written, processes
 from harness.package import main, marrow
-from written_nodes import Written, processes
 
 START = marrow.Pose(numpy.eye(4))
 
@@ -74,9 +73,8 @@ class Optimizers(FunctionNodes):
         self.refuses(("the optimizer got a start without coordinates; it needs one", nowhere))
 
     def test_it_registers_with_a_cost(self):
-        found = marrow.register.multiresolution(
-            cost=marrow.similarity.near(), optimizer=marrow.optimizer.steps(), start=START
-        )
+        cost, optimizer = marrow.similarity.near(), marrow.optimizer.steps()
+        found = marrow.register.multiresolution(cost=cost, optimizer=optimizer, start=START)
         self.assertLess(numpy.abs(found.pose.matrix[:3, 3] - 3).max(), 0.1)
 
     def test_what_the_function_raises_is_raised_and_the_next_call_works(self):
@@ -187,9 +185,8 @@ class Decorators(FunctionNodes):
         self.assertGreater(found.evaluations, 2 * alone.evaluations)
 
     def test_the_budget_ends_an_inner_minimisation(self):
-        found = marrow.optimizer.thrice(self.plain).minimise(
-            lambda x: float((x**2).sum()), [3.0, 1.0], [1, 1], max_evaluations=25
-        )
+        thrice = marrow.optimizer.thrice(self.plain)
+        found = thrice.minimise(lambda x: float((x**2).sum()), [3.0, 1.0], [1, 1], max_evaluations=25)
         self.assertEqual((found.evaluations, found.stopped_because), (25, "the budget of 25 evaluations is spent"))
 
     def test_a_problem_that_is_handed_on_is_the_same_problem(self):

@@ -12,9 +12,8 @@ class Nodes(PackageCase):
         expected = pipeline.run(only=["edges"])["edges"]["lateral"].pixels
         views = marrow.read.case(path=self.folder).views
         self.assertTrue(numpy.array_equal(marrow.edges.canny(views["lateral"], noise_high=8).pixels, expected))
-        self.assertTrue(
-            numpy.array_equal(marrow.node("edges.canny")(view=views["lateral"], noise_high=8).pixels, expected)
-        )
+        found = marrow.node("edges.canny")(view=views["lateral"], noise_high=8)
+        self.assertTrue(numpy.array_equal(found.pixels, expected))
         self.assertFalse(len(marrow.edges.canny(views["lateral"]).pixels) == len(expected))
 
     def test_a_list_means_one_call_for_each_item(self):
@@ -38,9 +37,8 @@ class Nodes(PackageCase):
         start = marrow.initial.shaft_axis(model=model, lines=shaft, views=case.views)
         outline = marrow.project.silhouette_edges(model=model, volume=case.ct)
         cost = marrow.similarity.contour_distance(projector=outline, views=case.views, edges=edges)
-        found = marrow.register.multiresolution(
-            cost=cost, optimizer=marrow.optimizer.levenberg_marquardt(), start=start
-        )
+        least = marrow.optimizer.levenberg_marquardt()
+        found = marrow.register.multiresolution(cost=cost, optimizer=least, start=start)
         expected = self.pipeline.run(only=["pose"], keep=False)["pose"]
         self.assertEqual(found.pose["distal"].matrix.tolist(), expected["distal"].matrix.tolist())
 
@@ -53,9 +51,8 @@ class Nodes(PackageCase):
             "    sigma_px (number in px, at least 0.7, at most 10, default 1.5): standard deviation", canny.__doc__
         )
         signature = inspect.signature(canny)
-        self.assertEqual(
-            list(signature.parameters), ["view", "sigma_px", "logarithm", "window_px", "noise_low", "noise_high"]
-        )
+        names = ["view", "sigma_px", "logarithm", "window_px", "noise_low", "noise_high"]
+        self.assertEqual(list(signature.parameters), names)
         self.assertEqual(signature.parameters["noise_high"].default, 5)
         self.assertEqual(signature.parameters["noise_high"].kind, inspect.Parameter.KEYWORD_ONLY)
         self.assertIn("canny", dir(marrow.edges))

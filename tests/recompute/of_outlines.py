@@ -10,8 +10,7 @@ from scipy.spatial import cKDTree
 
 import surface
 from figures import NotRecomputed, within
-from pictures import read_grey
-from values import read_camera, read_field, read_pose, read_view_image
+from values import read_camera, read_field, read_grey, read_pose, read_view_image
 
 FINE = 4  # pixels of the shadow in a pixel of the image
 ALLOWED_PX, ALLOWED_PERCENT = 0.1, 3

@@ -9,7 +9,7 @@ from harness import MARROW, SOURCE, need_scipy
 from harness.program import marrow
 
 sys.dont_write_bytecode = True
-need_scipy()  # before the module below
+need_scipy("PIL")  # before the module below
 import recompute as program  # noqa: E402
 
 

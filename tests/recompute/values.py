@@ -7,10 +7,9 @@ import zlib
 
 import numpy as np
 import yaml
+from PIL import Image
 
-from camera import Camera, transform_of
-from pictures import read_grey
-from rigid import Frame, Transform
+from rigid import Camera, Frame, Transform, transform_of
 
 
 class Loader(getattr(yaml, "CSafeLoader", yaml.SafeLoader)):
@@ -59,6 +58,12 @@ def read_camera(source):
     """Of a camera's file, of the folder of a view, or of an entry of a case."""
     path = source["camera"] if isinstance(source, dict) else source
     return Camera.of_map(read_yaml(path / "camera.yaml" if path.is_dir() else path))
+
+
+def read_grey(path):
+    """Rows of values; of a picture in colour, its first channel."""
+    pixels = np.asarray(Image.open(path), float)
+    return pixels if pixels.ndim == 2 else pixels[:, :, 0]
 
 
 def read_view_image(source):

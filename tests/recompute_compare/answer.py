@@ -6,10 +6,8 @@ import math
 from scipy import stats
 
 import findings
-import looks
-import medians
+import intervals
 import ranks
-from rates import Rate, capture_range
 
 ALPHA = 0.05
 
@@ -34,7 +32,7 @@ class OfVariant:
         return {(row.case, row.start) for row in self.rows if row.values[metric] is not None}
 
     def success(self):
-        return Rate([(row.case, row.success) for row in self.rows])
+        return intervals.Rate([(row.case, row.success) for row in self.rows])
 
 
 def by_variant(experiment, rows):
@@ -48,7 +46,7 @@ def finite(value):
 def figure(values, of, higher_is_better=False, interval=None):
     tree = {"count": len(values), "of": of}
     if values:
-        tree.update(medians.summary(values, higher_is_better))
+        tree.update(intervals.summary(values, higher_is_better))
     if interval:
         tree.update(median_low=interval[0], median_high=interval[1])
     return tree
@@ -70,8 +68,8 @@ def verdicts(own):
         return None
     tree = {"cells": len(judged), "silent_failures": None, "caught": None, "false_alarms": None}
     if own.experiment.has_limits:
-        silent = Rate([(row.case, row.verdict == "trusted") for row in judged if not row.success])
-        alarms = Rate([(row.case, row.verdict != "trusted") for row in judged if row.success])
+        silent = intervals.Rate([(row.case, row.verdict == "trusted") for row in judged if not row.success])
+        alarms = intervals.Rate([(row.case, row.verdict != "trusted") for row in judged if row.success])
         tree.update(silent_failures=rate(silent), caught=silent.of - silent.count, false_alarms=rate(alarms))
     return tree
 
@@ -83,7 +81,7 @@ def capture(own, rows):
     starts = [
         (float(known[row.case, row.start]), row.success, row.case) for row in own.rows if (row.case, row.start) in known
     ]
-    bins, reached, is_open = capture_range(starts)
+    bins, reached, is_open = intervals.capture_range(starts)
     return {
         "range": reached if bins else None,
         "is_open": is_open,
@@ -121,7 +119,7 @@ def variant_tree(own, variant, is_baseline, rows, seconds):
         "success": {**rate(success), "effective_runs": success.effective} if success else None,
         "metrics": {
             metric.path: figure(
-                own.values(m), runs, metric.higher_is_better, medians.median_interval(own.values_by_case(m))
+                own.values(m), runs, metric.higher_is_better, intervals.median_interval(own.values_by_case(m))
             )
             for m, metric in enumerate(experiment.metrics)
         },
@@ -154,7 +152,7 @@ class Compared:
         self.count = len(values)
         self.p, self.is_positive = ranks.signed_rank_p(values) if values else (1.0, False)
         self.difference = ranks.median(values) if values else None
-        bounds = medians.order_statistics(values, level) if values else None
+        bounds = intervals.order_statistics(values, level) if values else None
         self.has_interval = bounds is not None
         self.low, self.high = map(float, bounds or (-math.inf, math.inf))
         self.median_of_both = ranks.median(self.of_both) if self.of_both else None
@@ -255,9 +253,9 @@ def curve_point(experiment, variants, of_variant, metric):
         return {**tree, "middle": success.rate, "low": success.low, "high": success.high}
     found = together.values(metric)
     tree["runs"] = len(found)
-    interval = medians.median_interval(together.values_by_case(metric))
+    interval = intervals.median_interval(together.values_by_case(metric))
     if found:
-        tree["middle"] = medians.summary(found)["median"]
+        tree["middle"] = intervals.summary(found)["median"]
     return {**tree, "low": interval[0], "high": interval[1]} if interval else tree
 
 
@@ -286,10 +284,10 @@ def curve_trees(experiment, variants, of_variant, sweep):
 def look_tree(experiment, of_variant, cases):
     """What the rule under `stop` says after so many cases."""
     stop = experiment.stop
-    numbers = looks.looks(len(experiment.cases), stop["look_every"], stop["most_cases"])
+    numbers = ranks.looks(len(experiment.cases), stop["look_every"], stop["most_cases"])
     alpha, is_width = stop.get("alpha", 0.05), "width" in stop
     number = numbers.index(cases)
-    level = looks.levels([n / stop["most_cases"] for n in numbers], alpha, is_width)[number]
+    level = ranks.levels([n / stop["most_cases"] for n in numbers], alpha, is_width)[number]
     tree = {"look": number + 1, "looks": len(numbers), "cases": cases, "most_cases": stop["most_cases"]}
     paths = [metric.path for metric in experiment.metrics]
     figure_name = stop.get("figure", stop.get("difference"))
@@ -308,20 +306,20 @@ def look_tree(experiment, of_variant, cases):
             "difference": finite(0.0 if compared.difference is None else compared.difference),
             "alpha": alpha,
         }
-    intervals = []
+    bounds = []
     for own in of_variant:
         if figure_name == "success":
-            intervals.append(own.success().exact(1 - level))
+            bounds.append(own.success().exact(1 - level))
         else:
-            intervals.append(medians.median_interval(own.values_by_case(paths.index(figure_name)), 1 - level))
-    widths = [high - low for low, high in (interval or (-math.inf, math.inf) for interval in intervals)]
+            bounds.append(intervals.median_interval(own.values_by_case(paths.index(figure_name)), 1 - level))
+    widths = [high - low for low, high in (interval or (-math.inf, math.inf) for interval in bounds)]
     widest = max(range(len(widths)), key=lambda i: (widths[i], -i))
     return {
         **tree,
         "is_met": bool(widths[widest] <= stop["width"]),
         "variant": experiment.variants[widest].name,
-        "low": intervals[widest][0] if intervals[widest] else None,
-        "high": intervals[widest][1] if intervals[widest] else None,
+        "low": bounds[widest][0] if bounds[widest] else None,
+        "high": bounds[widest][1] if bounds[widest] else None,
         "width": stop["width"],
     }
 
@@ -329,7 +327,7 @@ def look_tree(experiment, of_variant, cases):
 def last_look(experiment):
     """The cases at which the comparison ends if it may add as many as it wants."""
     stop = experiment.stop
-    for cases in looks.looks(len(experiment.cases), stop["look_every"], stop["most_cases"]):
+    for cases in ranks.looks(len(experiment.cases), stop["look_every"], stop["most_cases"]):
         rows = experiment.rows(["seed-%d" % (i + 1) for i in range(cases)])
         if look_tree(experiment, by_variant(experiment, rows), cases)["is_met"]:
             return cases

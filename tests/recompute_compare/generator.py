@@ -6,7 +6,7 @@ import numpy
 from scipy.stats import qmc
 
 from experiment import Experiment, Metric, Variant
-from medians import uniform
+from intervals import uniform
 
 UNITS = ("mm", "deg", "px", "%", "")
 

@@ -41,14 +41,9 @@ def check_tree(checks, kind, got, expected, noise, path=""):
         checks.close(kind, path, got, expected, relative, 0 if is_exact else noise)
 
 
-def noise_of(rows):
-    """A billionth of a thousandth of the largest number: what is left where equal numbers are taken from another."""
-    sizes = [abs(float(value)) for row in rows for value in row.values if value is not None]
-    return 1e-12 * max(sizes, default=0)
-
-
 def check_answer(checks, kind, got, expected, rows):
-    """Noise is taken for each figure by itself, because figures may be of very different sizes."""
+    """Noise is a billionth of a thousandth of a figure's largest number: what is left where equal numbers are taken
+    from another. It is taken for each figure by itself, because figures may be of very different sizes."""
     by_metric = {metric["name"]: m for m, metric in enumerate(expected["metrics"])}
 
     def noise(name):

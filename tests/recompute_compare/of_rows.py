@@ -5,6 +5,7 @@ import json
 import math
 
 NINE_DIGITS = 1e-8  # of numbers that are written with nine
+EXACT = 1e-9
 
 
 def number(text):
@@ -26,23 +27,29 @@ def unquoted(text):
     return text[1:] if text[:1] == "'" else text
 
 
+def check_row(checks, kind, row, told, values, number_of, seconds, relative):
+    """`told`: variant, case, start, status, success and verdict; `number_of` gives a number by its name."""
+    status = "failed" if row.failed else "done"
+    expected = [row.variant, row.case, row.start, status, row.success, row.verdict]
+    for name, got, right in zip(("variant", "case", "start", "status", "success", "verdict"), told, expected):
+        checks.same(kind, row.id + " " + name, got, right)
+    for m, (got, value) in enumerate(zip(values, row.values)):
+        checks.close(kind, "%s value %d" % (row.id, m), got, as_float(value), relative)
+    for key, value in numbers_of(row, seconds).items():
+        checks.close(kind, row.id + " " + key, number_of(key), value, relative)
+
+
 def check_csv(checks, folder, experiment, rows, seconds):
     with open(folder / "cells.csv", newline="") as stream:
         table = list(csv.DictReader(stream))
     checks.same("cells.csv", "rows", len(table), len(rows))
     for got, row in zip(table, rows):
-        names = [unquoted(got[key]) for key in ("cell", "variant", "case", "start")]
+        checks.same("cells.csv", row.id + " name", unquoted(got["cell"]), row.id)
         checks.that("cells.csv", row.id + " is a text", got["case"][0] not in "=+-@", got["case"])
-        checks.same("cells.csv", row.id + " names", names, [row.id, row.variant, row.case, row.start])
-        checks.same("cells.csv", row.id + " status", got["status"], "failed" if row.failed else "done")
-        is_good = "" if row.success is None else "1" if row.success else "0"
-        checks.same("cells.csv", row.id + " success", got["success"], is_good)
-        checks.same("cells.csv", row.id + " verdict", got["verdict"], row.verdict or "")
-        for metric, value in zip(experiment.metrics, row.values):
-            what = row.id + " " + metric.path
-            checks.close("cells.csv", what, number(got[metric.path]), as_float(value), NINE_DIGITS)
-        for key, value in numbers_of(row, seconds).items():
-            checks.close("cells.csv", row.id + " " + key, number(got[key]), value, NINE_DIGITS)
+        told = [unquoted(got[key]) for key in ("variant", "case", "start")]
+        told += [got["status"], {"": None, "1": True, "0": False}.get(got["success"], "?"), got["verdict"] or None]
+        values = [number(got[metric.path]) for metric in experiment.metrics]
+        check_row(checks, "cells.csv", row, told, values, lambda key: number(got[key]), seconds, NINE_DIGITS)
         variant = next(one for one in experiment.variants if one.name == row.variant)
         for (name, levels), level in zip(experiment.factors, variant.levels):
             if name != "variants":
@@ -69,18 +76,13 @@ def check_jsonl(checks, folder, experiment, rows, seconds):
     table = list(map(json.loads, (folder / "cells.jsonl").read_text().splitlines()))
     checks.same("cells.jsonl", "rows", len(table), len(rows))
     for got, row in zip(table, rows):
-        names = [got[key] for key in ("id", "variant", "case", "start")]
-        checks.same("cells.jsonl", row.id + " names", names, [row.id, row.variant, row.case, row.start])
-        checks.same("cells.jsonl", row.id + " status", got["status"], "failed" if row.failed else "done")
-        checks.same("cells.jsonl", row.id + " success", got["success"], row.success)
-        checks.same("cells.jsonl", row.id + " verdict", got.get("verdict"), row.verdict)
+        checks.same("cells.jsonl", row.id + " name", got["id"], row.id)
+        told = [got.get(key) for key in ("variant", "case", "start", "status", "success", "verdict")]
+        check_row(checks, "cells.jsonl", row, told, got["values"], got.get, seconds, EXACT)
         for m, (metric, value) in enumerate(zip(experiment.metrics, row.values)):
             checks.close("cells.jsonl", row.id + " " + metric.path, got[metric.path], as_float(value))
-            checks.close("cells.jsonl", row.id + " value %d" % m, got["values"][m], as_float(value))
             unit = metric.unit if value is not None else ""
             checks.same("cells.jsonl", row.id + " unit %d" % m, got["units"][m], unit)
-        for key, value in numbers_of(row, seconds).items():
-            checks.close("cells.jsonl", row.id + " " + key, got.get(key), value)
 
 
 def pose_of(evaluations):
@@ -147,13 +149,7 @@ def check_report_rows(checks, data, experiment, rows, seconds):
     of = lambda got, name: dict(zip(fields, got)).get(name)
     text = lambda got, name: None if of(got, name) is None else texts[of(got, name)]
     for got, row in zip(table["rows"], rows):
-        names = [data["variants"][of(got, "variant")]["name"], data["cases"][of(got, "case")]]
-        names.append(data["starts"][of(got, "start")])
-        checks.same("report cells", row.id + " names", names, [row.variant, row.case, row.start])
-        checks.same("report cells", row.id + " status", text(got, "status"), "failed" if row.failed else "done")
-        checks.same("report cells", row.id + " success", of(got, "success"), row.success)
-        checks.same("report cells", row.id + " verdict", text(got, "verdict"), row.verdict)
-        for metric, value, seen in zip(experiment.metrics, row.values, got[len(fields) :]):
-            checks.close("report cells", row.id + " " + metric.path, seen, as_float(value), NINE_DIGITS)
-        for key, value in numbers_of(row, seconds).items():
-            checks.close("report cells", row.id + " " + key, of(got, key), value, NINE_DIGITS)
+        told = [data["variants"][of(got, "variant")]["name"], data["cases"][of(got, "case")]]
+        told += [data["starts"][of(got, "start")], text(got, "status"), of(got, "success"), text(got, "verdict")]
+        values = got[len(fields) :]
+        check_row(checks, "report cells", row, told, values, lambda key: of(got, key), seconds, NINE_DIGITS)

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Differences over cases, Wilcoxon's signed-rank test and Holm's correction, in exact arithmetic.
+"""Differences over cases, Wilcoxon's signed-rank test and Holm's correction, in exact arithmetic; and the levels at
+which a comparison is looked at while cases are added (Lan and DeMets 1983).
 
 Values are fractions, as the table of the plugin writes them, so nothing is rounded: two differences are equal, or one
 is 0, where this is so in decimal numbers.
@@ -10,9 +11,9 @@ import math
 from fractions import Fraction
 
 import numpy
+from scipy.optimize import brentq
 from scipy.stats import norm, rankdata
 
-ENUMERATED = 14  # cases up to which all signs are tried
 EXACT = 50  # cases up to which p is from the exact distribution
 
 
@@ -62,11 +63,6 @@ def signed_ranks(values):
     return ranks[kept], [1 if values[i] > 0 else -1 for i in kept], len(values) - len(kept)
 
 
-def p_enumerated(ranks, smaller):
-    signs = numpy.array(list(itertools.product([0, 1], repeat=len(ranks))))
-    return min(1.0, 2 * float(numpy.mean(signs @ ranks <= smaller + 1e-9)))
-
-
 def p_counted(ranks, smaller):
     """By the polynomial whose coefficients count the sets of ranks with each sum."""
     counts = {0: 1}
@@ -100,12 +96,7 @@ def known_signed_rank_p(values):
     positive = sum(rank for rank, sign in zip(ranks, signs) if sign > 0)
     negative = sum(ranks) - positive
     smaller = min(positive, negative)
-    if len(ranks) <= ENUMERATED:
-        p = p_enumerated(ranks, smaller)
-    elif len(ranks) <= EXACT:
-        p = p_counted(ranks, smaller)
-    else:
-        p = p_normal(ranks, smaller, zeros)
+    p = p_counted(ranks, smaller) if len(ranks) <= EXACT else p_normal(ranks, smaller, zeros)
     return p, positive > negative
 
 
@@ -122,3 +113,40 @@ def holm(p_values):
 def fewest_cases(alpha, comparisons):
     """With so many cases, the least p that there is, 2^(1 - n), is below alpha after Holm's largest factor."""
     return next(n for n in itertools.count(1) if comparisons * Fraction(2) ** (1 - n) < Fraction(str(alpha)))
+
+
+NODES, WEIGHTS = numpy.polynomial.legendre.leggauss(200)
+
+
+def spent(share, alpha, is_even):
+    if is_even:
+        return alpha * math.log(1 + (math.e - 1) * share)
+    return 4 * norm.sf(norm.isf(alpha / 4) / math.sqrt(share))
+
+
+def levels(shares, alpha, is_even):
+    """Two-sided levels. The test's sum is a Brownian motion; Gauss and Legendre's rule carries its density from look to
+    look, as long as it stays within the bounds."""
+    found, before, time = [], 0.0, 0.0
+    places = masses = None
+    for share in shares:
+        chance, sd = spent(share, alpha, is_even) - before, math.sqrt(share - time)
+
+        def beyond(z):
+            end = z * math.sqrt(share)
+            if places is None:
+                return 2 * norm.sf(end / sd)
+            return masses @ (norm.sf((end - places) / sd) + norm.sf((end + places) / sd))
+
+        z = brentq(lambda z: beyond(z) - chance, 0, 40, xtol=1e-12)
+        found.append(2 * norm.sf(z))
+        end = min(z, 8.5) * math.sqrt(share)
+        new = end * NODES
+        density = norm.pdf(new, scale=sd) if places is None else norm.pdf(new[:, None] - places, scale=sd) @ masses
+        places, masses = new, end * WEIGHTS * density
+        before, time = spent(share, alpha, is_even), share
+    return found
+
+
+def looks(first, every, most):
+    return sorted(set(range(first, most, every)) | {most})

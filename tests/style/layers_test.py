@@ -122,11 +122,11 @@ class Layers(unittest.TestCase):
                     why = other and fault(path, other)
                     if why:
                         faults.append("%s includes %s: %s" % (path, other, why))
-        self.assertGreater(seen, 3000)
+        self.assertGreater(seen, 2000)
         self.assertEqual(faults, [])
 
     def test_a_public_header_needs_public_headers_only(self):
-        self.assertGreater(len(PUBLIC), 200)
+        self.assertGreater(len(PUBLIC), 150)
         faults = []
         for path in sorted(PUBLIC):
             for name in INCLUDE.findall((SOURCE / path).read_text()):
@@ -153,7 +153,7 @@ class Layers(unittest.TestCase):
         self.assertIn("may not include plugins", between("plugins/toolbox/files/a.cpp", "plugins/read/b.hpp"))
         self.assertIn("may not include toolbox", between("python/bindings/a.cpp", "plugins/toolbox/image/b.hpp"))
         self.assertIn("is private", between("tools/marrow/a.cpp", "framework/marrow/runtime/store/store_file.hpp"))
-        self.assertIn("may not include workbench", between("tools/marrow/a.cpp", "tools/workbench/open.hpp"))
+        self.assertIn("may not include workbench", between("tools/marrow/a.cpp", "tools/workbench/workbench.hpp"))
         self.assertIsNone(between("plugins/toolbox/files/a.cpp", "plugins/toolbox/files/b.hpp"))
         self.assertIsNone(between("plugins/camera/a.cpp", "framework/marrow/plugin.hpp"))
         self.assertIsNone(between("framework/marrow/runtime/run/a.cpp", "framework/marrow/runtime/store/store.hpp"))

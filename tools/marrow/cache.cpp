@@ -5,7 +5,6 @@
 #include <set>
 
 #include "command_options.hpp"
-#include "commands.hpp"
 #include "marrow/base/number_text.hpp"
 #include "marrow/base/printable.hpp"
 #include "marrow/runtime/store/shared_store.hpp"

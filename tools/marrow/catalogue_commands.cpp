@@ -5,17 +5,11 @@
 #include <cstdio>
 #include <nlohmann/json.hpp>
 
-#include "catalogue_text.hpp"
-#include "columns.hpp"
 #include "command_options.hpp"
-#include "commands.hpp"
-#include "marrow/base/diagnostics.hpp"
-#include "marrow/base/error.hpp"
 #include "marrow/base/number_text.hpp"
 #include "marrow/base/printable.hpp"
 #include "marrow/conformance.hpp"
 #include "marrow/runtime/pipeline/pipeline_names.hpp"
-#include "marrow/runtime/plugins/library.hpp"
 
 namespace marrow::cli {
 namespace {
@@ -125,6 +119,10 @@ int doctor(bool as_json) {
     json kinds = json::array(), nodes = json::array();
     std::string text;
     for (const KindInfo& kind : library.kinds) {
+      if (kind.is_suite) {
+        text += (text.empty() ? "the suite of the kind " : ", the suite of the kind ") + kind.name;
+        continue;
+      }
       kinds.push_back(kind.name);
       const bool hidden = catalogue.library_of_kind(kind.name) != &library;
       text +=

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "catalogue_text.hpp"
+#include "commands.hpp"
 
 #include <yaml-cpp/emitter.h>
 
@@ -9,7 +9,6 @@
 
 #include "marrow/base/number_text.hpp"
 #include "marrow/runtime/pipeline/pipeline_names.hpp"
-#include "marrow/runtime/plugins/contract.hpp"
 
 namespace marrow::cli {
 namespace {

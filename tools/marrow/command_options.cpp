@@ -1,8 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "command_options.hpp"
 
+#include <sys/ioctl.h>
+#include <unistd.h>
+
 #include <charconv>
+#include <cstdio>
 #include <cstdlib>
+#include <sstream>
 
 #include "marrow/base/number_text.hpp"
 
@@ -19,6 +24,88 @@ bool is_read(const std::string& text, T& value) {
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
   return error == std::errc() && end == text.data() + text.size();
 }
+
+constexpr std::size_t kLeastRoom = 24;  // a narrower column is hard to read
+
+constexpr std::size_t kShortIndent = 6;  // where there is no room beside the head
+
+/// All bytes but those that continue a character of UTF-8.
+std::size_t width_of(const std::string& text) {
+  return std::size_t(std::count_if(text.begin(), text.end(), [](unsigned char byte) { return (byte & 0xC0) != 0x80; }));
+}
+
+/// The lines of one line of text that may be too long.
+std::vector<std::string> broken(const std::string& line, std::size_t room) {
+  std::vector<std::string> lines{""};
+  std::istringstream words(line);
+  for (std::string word; words >> word;) {
+    std::string& last = lines.back();
+    if (last.empty())
+      last = word;
+    else if (width_of(last) + 1 + width_of(word) <= room)
+      last += " " + word;
+    else
+      lines.push_back(word);
+  }
+  return lines;
+}
+
+/// The characters in a line of the terminal that the standard output goes to. 0 if it goes elsewhere: then each row is
+/// one line, so that other programs can read it.
+std::size_t terminal_columns() {
+  winsize size{};
+  return isatty(STDOUT_FILENO) && ioctl(STDOUT_FILENO, TIOCGWINSZ, &size) == 0 ? size.ws_col : 0;
+}
+
+/// `head` and beside it, from the column `indent` on, `text` in lines of at most `columns` characters, each with a line
+/// break at its end. With 0 columns lines are only broken where the text has breaks. Where too little room is left,
+/// `text` begins on the next line. Words are not broken.
+std::string wrapped_beside(const std::string& head, const std::string& text, std::size_t indent, std::size_t columns) {
+  const bool is_narrow = columns != 0 && columns < indent + kLeastRoom;
+  const std::size_t margin = is_narrow ? std::min(indent, kShortIndent) : indent;
+  std::string result = head;
+  if (text.empty()) return result + "\n";
+  if (columns != 0 && !head.empty() && (is_narrow || width_of(head) >= margin)) {
+    result.erase(result.find_last_not_of(' ') + 1);
+    result += "\n" + std::string(margin, ' ');
+  } else {
+    result += std::string(std::max(margin, width_of(head) + (head.empty() ? 0 : 1)) - width_of(head), ' ');
+  }
+  std::istringstream lines(text);
+  bool is_first = true;
+  for (std::string line; std::getline(lines, line);)
+    for (const std::string& part :
+         columns ? broken(line, columns > margin ? columns - margin : 1) : std::vector<std::string>{line}) {
+      result += (is_first ? "" : std::string(margin, ' ')) + part + "\n";
+      is_first = false;
+    }
+  return result;
+}
+
+class WrappedHelp : public CLI::Formatter {
+ public:
+  std::string make_option(const CLI::Option* option, bool is_positional) const override {
+    return row(make_option_name(option, is_positional) + make_option_opts(option), make_option_desc(option));
+  }
+  std::string make_subcommand(const CLI::App* command) const override {
+    return row(command->get_name(), command->get_description());
+  }
+  std::string make_description(const CLI::App* app) const override {
+    return wrapped_beside("", app->get_description(), 0, terminal_columns());
+  }
+  std::string make_footer(const CLI::App* app) const override {
+    const std::string text = app->get_footer();
+    return text.empty() ? text : wrapped_beside("", text, 0, terminal_columns());
+  }
+
+ private:
+  std::string row(const std::string& name, const std::string& text) const {
+    const std::size_t indent = get_column_width();
+    const std::string head = "  " + name;
+    if (head.size() < indent || text.empty()) return wrapped_beside(head, text, indent, terminal_columns());
+    return head + "\n" + wrapped_beside("", text, indent, terminal_columns());
+  }
+};
 
 }  // namespace
 
@@ -101,5 +188,11 @@ void say_that_libraries_are_described(CLI::App* command) {
       "A plugin library that marrow does not know yet is loaded once in a separate process, which describes it. Only "
       "folders that nobody else may write to are searched: see 'marrow doctor' and MARROW_PLUGIN_PATH.");
 }
+
+void print_beside(const std::string& head, const std::string& text, std::size_t indent) {
+  std::fputs(wrapped_beside(head, text, indent, terminal_columns()).c_str(), stdout);
+}
+
+std::shared_ptr<CLI::FormatterBase> wrapped_help() { return std::make_shared<WrappedHelp>(); }
 
 }  // namespace marrow::cli

@@ -5,6 +5,7 @@
 #include <CLI/CLI.hpp>
 #include <cstdint>
 #include <limits>
+#include <memory>
 #include <string>
 
 #include "commands.hpp"
@@ -48,5 +49,13 @@ void add_shared_cache(CLI::App* command);
 void add_log_level(CLI::App* command, LogLevel& level);
 /// Adds a note below the help: the command may load libraries to describe them.
 void say_that_libraries_are_described(CLI::App* command);
+
+// Tables on a terminal: the last column is wrapped at the terminal's edge.
+
+/// Prints such a row for the terminal.
+void print_beside(const std::string& head, const std::string& text, std::size_t indent);
+
+/// How CLI11 writes the help, with rows that are wrapped.
+std::shared_ptr<CLI::FormatterBase> wrapped_help();
 
 }  // namespace marrow::cli

@@ -8,8 +8,6 @@
 #include <string>
 #include <vector>
 
-#include "marrow/runtime/pipeline/pipeline.hpp"
-#include "marrow/runtime/run/executor.hpp"
 #include "marrow/runtime/run/run_folder.hpp"
 #include "marrow/runtime/run/verdicts.hpp"
 
@@ -127,8 +125,6 @@ PipelineArguments arguments_of(const PipelineRequest& request);
 /// Reads the pipeline. If it has faults, prints all of them and returns false.
 bool load(const PipelineRequest& request, const Catalogue& catalogue, Pipeline& pipeline, bool inputs_required);
 
-/// Prints the pipeline's inputs, one a line: name, type, default and help.
-void print_inputs(const Pipeline& pipeline);
 /// Prints what a pipeline is for, takes and gives. Returns the exit code.
 int inspect_pipeline(const std::filesystem::path& file, bool as_json);
 
@@ -164,5 +160,50 @@ int show_plan(const Pipeline& pipeline, const Catalogue& catalogue, std::uint64_
 void print_value(const std::string& name, const Value& value);
 /// Prints the most important results: poses and figures of merit.
 void print_results(const Pipeline& pipeline, const RunResult& result);
+
+// The description of a node and of a kind, as JSON and in words.
+
+nlohmann::json node_json(const NodeInfo& node);
+/// The contract of a kind, with the limits of its checks.
+nlohmann::json kind_json(const KindInfo& kind);
+/// {node, fits: "yes", "with more" or "no", missing, faults}
+nlohmann::json fit_json(const Fit& fit);
+/// "edge_map", "list of view over view".
+std::string port_text(const PortInfo& port);
+std::string port_text(const KindPort& port);
+/// The default of an option, as YAML.
+std::string yaml_text(const OptionValue& value);
+/// "number, 0 to 100 px", "one of: a, b".
+std::string range_text(const OptionInfo& option);
+/// What the option replaces, in words; empty if nothing.
+std::string replaces_text(const OptionInfo& option);
+/// "'low' is not above 'high'".
+std::string relation_text(const RelationInfo& relation);
+
+// A pipeline as a drawing: bodies are drawn beside the nodes that run them.
+
+struct DrawnNode {
+  std::string id;    ///< of a node of a body: "node/node of the body"
+  std::string body;  ///< the node whose body it is in; empty outside of bodies
+  const PipelineNode* node = nullptr;
+  bool is_needed = true;  ///< it feeds an output
+};
+
+struct DrawnEdge {
+  std::string from, to, port;
+  bool is_function = false;
+  bool is_of_pass_before = false;  ///< it hands on what the pass before made
+};
+
+struct DrawnGraph {
+  std::vector<DrawnNode> nodes;
+  std::vector<DrawnEdge> edges;
+};
+
+/// With `only_needed`, nodes that feed no output are left out. The pipeline must outlive the result.
+DrawnGraph drawn_graph(const Pipeline& pipeline, bool only_needed);
+
+/// How a body is run, in words: "each frame in turn", "at most 8 passes, until done".
+std::string passes_text(const Repetition& repetition);
 
 }  // namespace marrow::cli

@@ -4,8 +4,6 @@
 #include <cstdio>
 
 #include "command_options.hpp"
-#include "commands.hpp"
-#include "marrow/base/error.hpp"
 #include "marrow/base/printable.hpp"
 #include "new/templates.hpp"
 #include "process.hpp"

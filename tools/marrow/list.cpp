@@ -1,20 +1,32 @@
 // SPDX-License-Identifier: Apache-2.0
 // The command list: shows all nodes that can be used, those that fit a place in a pipeline, or the kinds.
+#include <dlfcn.h>
+
 #include <algorithm>
 #include <cstdio>
 #include <nlohmann/json.hpp>
+#include <string>
 
-#include "catalogue_text.hpp"
-#include "columns.hpp"
 #include "command_options.hpp"
-#include "commands.hpp"
-#include "device_text.hpp"
 #include "marrow/base/printable.hpp"
 
 namespace marrow::cli {
 namespace {
 
 using nlohmann::json;
+
+/// The sentence in which a node with the trait "device" says which device it would compute on, or why there is none
+/// (docs/plugins.md). Empty for other nodes, whose libraries are not loaded. Throws Error if the library cannot be
+/// loaded.
+std::string device_text(const std::string& node, const Catalogue& catalogue) {
+  const std::vector<std::string>& traits = catalogue.find(node)->traits;
+  if (std::find(traits.begin(), traits.end(), "device") == traits.end()) return "";
+  catalogue.load(node);
+  const std::filesystem::path file = std::filesystem::canonical(catalogue.library_of(node)->file);
+  void* library = dlopen(file.c_str(), RTLD_NOW | RTLD_LOCAL | RTLD_NOLOAD);
+  const auto ask = library ? reinterpret_cast<const char* (*)()>(dlsym(library, "marrow_device")) : nullptr;
+  return ask ? ask() : "it does not say which device is there: its library has no function marrow_device";
+}
 
 struct ListRequest {
   std::string kind;

@@ -3,9 +3,7 @@
 #include <cstdio>
 #include <nlohmann/json.hpp>
 
-#include "columns.hpp"
 #include "command_options.hpp"
-#include "commands.hpp"
 #include "marrow/base/number_text.hpp"
 #include "marrow/base/printable.hpp"
 #include "marrow/runtime/pipeline/pipeline_names.hpp"

@@ -1,13 +1,18 @@
 // SPDX-License-Identifier: Apache-2.0
 // `marrow replay`: makes one failed call of a run again, alone.
+#include <unistd.h>
+
 #include <algorithm>
+#include <cerrno>
+#include <csignal>
 #include <cstdio>
+#include <cstring>
+#include <filesystem>
 #include <optional>
+#include <string>
+#include <vector>
 
 #include "command_options.hpp"
-#include "commands.hpp"
-#include "debugger.hpp"
-#include "marrow/base/error.hpp"
 #include "marrow/base/number_text.hpp"
 #include "marrow/base/printable.hpp"
 #include "marrow/runtime/run/failed_calls.hpp"
@@ -19,6 +24,42 @@ namespace {
 
 namespace fs = std::filesystem;
 using Kind = RunEvent::Kind;
+
+namespace fs = std::filesystem;
+
+std::vector<std::string> command_of(const std::string& debugger, const fs::path& folder) {
+  const std::string name = fs::path(debugger).filename().string();
+  std::vector<std::string> command{debugger};
+  bool can_stop = true;
+  if (name == "gdb")
+    command.insert(command.end(), {"-q", "-ex", "set breakpoint pending on", "-ex", "run", "--args"});
+  else if (name == "lldb")
+    command.insert(command.end(), {"-o", "run", "--"});
+  else
+    can_stop = false;  // SIGTRAP would end what no debugger holds
+  command.insert(command.end(), {this_program().string(), "replay", folder.string(), "--in-this-process"});
+  if (can_stop) command.push_back("--stop");
+  return command;
+}
+
+/// The line for a shell that replays a failed call under a debugger.
+std::string debugger_line(const std::string& debugger, const fs::path& folder) {
+  return "marrow replay " + shell_path(folder) + " --debugger " + shell_word(debugger);
+}
+
+/// Replaces this process by the debugger, which replays the call. gdb and lldb stop right before it; any other program
+/// gets the command as its arguments. Throws Error if the debugger cannot be started.
+void start_under_debugger(const std::string& debugger, const fs::path& folder) {
+  std::vector<std::string> command = command_of(debugger, folder);
+  std::vector<char*> words;
+  for (std::string& word : command) words.push_back(word.data());
+  words.push_back(nullptr);
+  std::fflush(stdout);
+  for (const int ignored : {SIGPIPE, SIGXFSZ}) std::signal(ignored, SIG_DFL);
+  ::execvp(words[0], words.data());
+  throw Error("the debugger '" + debugger + "' cannot be started: " + std::strerror(errno) +
+              "; install it, or name another with --debugger");
+}
 
 struct ReplayRequest {
   fs::path folder;

@@ -11,7 +11,6 @@
 #include "marrow/base/json_text.hpp"
 #include "marrow/base/printable.hpp"
 #include "marrow/runtime/node/types.hpp"
-#include "marrow/runtime/run/run_log.hpp"
 #include "marrow/runtime/store/shared_store.hpp"
 
 namespace marrow::cli {

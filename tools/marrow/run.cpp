@@ -9,19 +9,11 @@
 #include <nlohmann/json.hpp>
 #include <set>
 
-#include "columns.hpp"
+#include "around_run.hpp"
 #include "command_options.hpp"
-#include "commands.hpp"
-#include "fruitless_run.hpp"
-#include "lacking.hpp"
-#include "marrow/base/error.hpp"
 #include "marrow/base/number_text.hpp"
 #include "marrow/base/printable.hpp"
-#include "marrow/runtime/pipeline/judged_poses.hpp"
-#include "marrow/runtime/run/run_folder.hpp"
-#include "marrow/runtime/run/verdict_json.hpp"
 #include "process.hpp"
-#include "profile_of_run.hpp"
 #include "report/report.hpp"
 
 namespace marrow::cli {

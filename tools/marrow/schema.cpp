@@ -4,9 +4,7 @@
 #include <map>
 #include <nlohmann/json.hpp>
 
-#include "catalogue_text.hpp"
 #include "command_options.hpp"
-#include "commands.hpp"
 #include "marrow/base/text_file.hpp"
 
 namespace marrow::cli {

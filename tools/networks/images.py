@@ -3,7 +3,7 @@
 import cv2
 import numpy as np
 
-DARKEST = 0.005  # of the grey value in air, as in plugins/toolbox/image/line_integrals.hpp
+DARKEST = 0.005  # of the grey value in air, as in plugins/toolbox/image/grey_values.hpp
 RIM_PX = 16  # the coarsest pixel of a network
 SCALE = (0, 2)  # these line integrals become 0 and 1: percentiles would follow a collimator's blades
 

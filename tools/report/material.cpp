@@ -6,14 +6,11 @@
 #include <sstream>
 #include <thread>
 
-#include "compare/csv.hpp"
-#include "marrow/base/error.hpp"
-#include "marrow/base/hash.hpp"
+#include "compare/text_table.hpp"
 #include "marrow/base/json_text.hpp"
 #include "marrow/base/number_text.hpp"
 #include "marrow/base/printable.hpp"
-#include "marrow/base/text_file.hpp"
-#include "marrow/runtime/run/verdict_json.hpp"
+#include "marrow/runtime/run/verdicts.hpp"
 #include "marrow/toolbox/files/yaml_values.hpp"
 #include "report/report.hpp"
 #include "run_files.hpp"

@@ -3,16 +3,33 @@
 // Writes one HTML file that shows a run or a comparison and needs no other file. For a large comparison, further
 // pictures are beside it. data.js in tools/report/page describes the data.
 #include <array>
+#include <cstddef>
 #include <filesystem>
 #include <nlohmann/json.hpp>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "compare/comparison.hpp"
 #include "marrow/base/text_file.hpp"
-#include "report/recipes.hpp"
 
 namespace marrow::cli {
+
+// The recipes of runs (marrow/runtime/run/run_recipe.hpp) in folders and in pages.
+
+struct NamedRecipe {
+  std::string name;  ///< the variant of a comparison; empty for a run
+  std::string text;
+};
+
+/// The recipe of the run in a folder. Throws Error if no run wrote the folder, or if its files cannot be read.
+std::string recipe_of_folder(const std::filesystem::path& folder);
+
+/// The element of a page that holds recipes.
+std::string recipes_element(const std::vector<NamedRecipe>& recipes);
+
+/// The recipes in a page; none if it has no such element. Throws Error if the element is damaged.
+std::vector<NamedRecipe> recipes_in_page(std::string_view page);
 
 /// Data that the cells of a report share: pictures, meshes and scenes, by the hash of their content.
 struct ReportMaterial {
@@ -45,10 +62,6 @@ std::string picture_url(const std::filesystem::path& png_file, int size_px);
 /// Writes the page with these data and recipes.
 void write_page(const nlohmann::json& data, const std::vector<NamedRecipe>& recipes, const std::filesystem::path& file,
                 Kinds kinds = Kinds::files);
-
-/// The text of JSON data inside of a script element. No text in the data may end the script, so "<" is written as a
-/// JSON escape.
-std::string text_in_page(const nlohmann::json& data);
 
 /// The figures of merit that a run wrote: one table for each folder of files, one column for each file in it.
 nlohmann::json figures_of(const std::filesystem::path& folder, const nlohmann::json& record);
@@ -84,5 +97,14 @@ std::string script_word(const std::string& text);
 void write_report(const compare::Experiment& experiment, const std::vector<compare::CellRow>& rows,
                   const Answer& answer, const compare::CellRunner& runner, const std::vector<compare::CellIndex>& shown,
                   const CompareRequest& request, const std::filesystem::path& folder);
+
+// The single cells on a comparison's page: a row for each, and pictures, curves and 3D views of some. The page holds as
+// many of these as its size allows; the others are beside it, in the folder report/.
+
+/// Whether a file of this name in FOLDER/report is a part of a page.
+bool is_part_name(const std::string& name);
+
+/// Bytes of the page with these data.
+std::size_t page_bytes(const nlohmann::json& data);
 
 }  // namespace marrow::cli

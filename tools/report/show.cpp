@@ -3,11 +3,9 @@
 #include <optional>
 
 #include "command_options.hpp"
-#include "marrow/base/error.hpp"
+#include "marrow/base/file_names.hpp"
 #include "marrow/base/json_text.hpp"
-#include "marrow/base/plain_path.hpp"
 #include "marrow/base/printable.hpp"
-#include "marrow/base/text_file.hpp"
 #include "report/report.hpp"
 #include "run_files.hpp"
 

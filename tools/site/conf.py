@@ -8,7 +8,7 @@ from sphinx.search.en import SearchEnglish
 sys.path.insert(0, str(pathlib.Path(__file__).parent))
 
 project = "marrow"
-extensions = ["myst_parser", "names", "navigation"]
+extensions = ["myst_parser", "names"]
 myst_heading_anchors = 4
 smartquotes = False
 highlight_language = "text"

@@ -4,8 +4,8 @@ import json
 import re
 import shutil
 
+import vocabulary
 from markdown import ORPHAN, block, sections, toctree
-from own_names import own_names_part
 
 # Captions of the navigation, and the pages under each. A page of docs/ that is not here comes last, under MORE.
 GROUPS = {
@@ -150,7 +150,7 @@ def write(catalogue, facts, folder):
             bring(place, facts.root.resolve(), folder)
         text = with_links(text, source, facts.root)
         if page == "docs/vocabulary":
-            text = sections(text, own_names_part(catalogue.nodes))
+            text = sections(text, vocabulary.tables(catalogue.nodes))
         if page == "index":
             text = sections(text, navigation(facts.documents, folder))
         (folder / page).parent.mkdir(parents=True, exist_ok=True)

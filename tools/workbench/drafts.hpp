@@ -4,8 +4,6 @@
 // undone. The drafts are in .marrow/drafts of the opened folder: a case's own folder holds only the case.
 #include <map>
 #include <mutex>
-#include <nlohmann/json.hpp>
-#include <string>
 #include <vector>
 
 #include "workbench/opened_folder.hpp"

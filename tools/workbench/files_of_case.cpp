@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "workbench/files_of_case.hpp"
 
 #include <fcntl.h>
 #include <signal.h>
@@ -13,13 +12,12 @@
 #include <cstdio>
 #include <cstring>
 #include <fstream>
-#include <vector>
 
 #include "marrow/base/descriptor.hpp"
 #include "marrow/base/error.hpp"
 #include "marrow/base/number_text.hpp"
-#include "marrow/base/process_identity.hpp"
-#include "workbench/case_text.hpp"
+#include "marrow/base/process_tree.hpp"
+#include "workbench/case_files.hpp"
 
 namespace fs = std::filesystem;
 

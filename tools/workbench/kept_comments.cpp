@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "workbench/kept_comments.hpp"
+#include "workbench/case_files.hpp"
 
 #include <algorithm>
 #include <cmath>

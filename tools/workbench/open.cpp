@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 // `marrow open`: the workbench in the browser.
-#include "workbench/open.hpp"
-
 #include <fcntl.h>
 #ifdef __GLIBC__
 #include <malloc.h>
@@ -12,13 +10,10 @@
 #include <cstdio>
 
 #include "command_options.hpp"
-#include "marrow/base/error.hpp"
-#include "marrow/base/number_text.hpp"
 #include "marrow/base/printable.hpp"
 #include "marrow/base/text_file.hpp"
 #include "process.hpp"
 #include "workbench/workbench.hpp"
-#include "workbench/working_files.hpp"
 
 namespace fs = std::filesystem;
 

@@ -29,4 +29,18 @@ class OpenedFolder {
   std::filesystem::path folder_;  ///< absolute, links resolved
 };
 
+/// When the file was written, in UTC: "2026-01-31T12:00:00Z". Empty if that cannot be read.
+std::string time_of_file(const std::filesystem::path& file);
+
+// Files in .marrow/drafts with parts of a draft that pipelines read: masks, cameras, points. A file is named after the
+// digest of its content, so it never changes.
+
+/// Writes the text to .marrow/drafts/NAME-DIGEST.ENDING, with the digest of the text, and returns the path.
+std::filesystem::path working_file(const OpenedFolder& folder, const std::string& name, const std::string& ending,
+                                   const std::string& text);
+
+/// Removes files that were not used in the last day and that no step of a draft names: undo may lead back to any step.
+/// If a draft cannot be read, all files stay.
+void remove_unused_working_files(const OpenedFolder& folder);
+
 }  // namespace marrow::workbench

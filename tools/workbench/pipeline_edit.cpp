@@ -1,12 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "workbench/pipeline_edit.hpp"
+#include "workbench/pipeline.hpp"
 
 #include <algorithm>
-#include <nlohmann/json.hpp>
 
-#include "marrow/base/error.hpp"
 #include "marrow/base/json_text.hpp"
-#include "marrow/base/names.hpp"
 #include "marrow/base/printable.hpp"
 #include "marrow/base/yaml.hpp"
 #include "marrow/runtime/pipeline/pipeline_names.hpp"

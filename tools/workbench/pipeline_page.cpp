@@ -1,15 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // The requests of the page "Pipeline".
-#include "catalogue_text.hpp"
-#include "marrow/base/error.hpp"
+#include "commands.hpp"
 #include "marrow/base/printable.hpp"
 #include "marrow/runtime/pipeline/pipeline_names.hpp"
-#include "workbench/kept_inputs.hpp"
-#include "workbench/own_pipelines.hpp"
-#include "workbench/pipeline_edit.hpp"
-#include "workbench/pipeline_files.hpp"
-#include "workbench/pipeline_run.hpp"
-#include "workbench/pipeline_state.hpp"
+#include "workbench/pipeline.hpp"
 
 namespace marrow::workbench {
 namespace {

@@ -1,11 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "workbench/pipeline_state.hpp"
+#include "workbench/pipeline.hpp"
 
-#include "catalogue_text.hpp"
 #include "commands.hpp"
-#include "marrow/base/error.hpp"
 #include "marrow/base/yaml.hpp"
-#include "marrow/runtime/run/run_folder.hpp"
 #include "report/report.hpp"
 #include "workbench/yaml_text.hpp"
 

@@ -1,15 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 // What the page "Place" keeps of a case in memory: its views, and the projectors and costs of each bone.
-#include <map>
-#include <memory>
-#include <mutex>
-#include <string>
-#include <vector>
+#include <optional>
 
 #include "marrow/domain/functions.hpp"
-#include "marrow/domain/list.hpp"
-#include "workbench/value_json.hpp"
 #include "workbench/workbench.hpp"
 
 namespace marrow::workbench {
@@ -56,28 +50,10 @@ class PlacedCases {
 /// A placement of a request: a 4 x 4 matrix as rows. Throws Error unless it is a rigid motion.
 RigidTransform placement_of(const nlohmann::json& matrix);
 
-/// The point nearest to the middle rays of all views.
-Eigen::Vector3d common_centre_mm(const List<View>& views);
-
 /// The image as 16 bit numbers, low byte first; each square of `step_px` pixels becomes its mean. Whole numbers stay as
 /// they are. Others are spread from the least to the largest value of `like`, so that frames of a sequence are shown
 /// alike. The page makes greys of them.
 std::string number_bytes(const View& view, const View& like, int step_px);
-
-/// What a request wants to see of a bone in a view.
-struct OverlayWish {
-  const View* view = nullptr;
-  const PlacedBone* bone = nullptr;
-  RigidTransform world_from_model;
-  int step_px = 1;
-  std::string what = "radiograph";  ///< radiograph, edges (how fast the radiograph changes) or outline
-};
-/// The part of the image that shows the bone: 8 bit for each pixel of a grid, or for an outline pairs of float (u, v).
-/// `about` becomes {u_px, v_px, step_px, columns, rows} of the grid, or {points}.
-std::string overlay_bytes(const OverlayWish& wish, nlohmann::json& about);
-
-/// {contour: {value, views: {NAME: value}}, grey_values: {...}} of a bone: smaller is better.
-nlohmann::json costs_of(const PlacedCase& placed, const PlacedBone& bone, const RigidTransform& world_from_model);
 
 /// The poses {BONE: matrix} of this name in a request. Throws Error unless each is a rigid motion.
 std::map<std::string, RigidTransform> poses_in(const Request& request, const char* name = "poses");

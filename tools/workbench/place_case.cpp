@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "marrow/base/error.hpp"
 #include "marrow/base/printable.hpp"
 #include "marrow/domain/decompositions.hpp"
 #include "marrow/domain/quantile.hpp"
@@ -45,6 +44,20 @@ std::shared_ptr<const Cost> coarse(std::shared_ptr<const Cost> fine) {
   return {cost, [fine = std::move(fine), made = std::move(made)](const Cost*) {}};
 }
 
+/// The point nearest to the middle rays of all views.
+Eigen::Vector3d common_centre_mm(const List<View>& views) {
+  Eigen::Matrix3d sum = 1e-9 * Eigen::Matrix3d::Identity();  // so that a single view has a centre, too
+  Eigen::Vector3d right = Eigen::Vector3d::Zero();
+  for (const View& view : views) {
+    const Eigen::Vector3d along =
+        ray_direction(view.camera, {0.5 * (view.camera.width_px - 1), 0.5 * (view.camera.height_px - 1)});
+    const Eigen::Matrix3d across = Eigen::Matrix3d::Identity() - along * along.transpose();
+    sum += across;
+    right += across * source_position_mm(view.camera);
+  }
+  return solve_symmetric<3>(sum, right);
+}
+
 void begin_at(PlacedBone& bone, const Pose* placed, const Pose* by_landmarks, const Pose& nominal,
               const List<View>& views) {
   bone.frame = nominal.frame;
@@ -81,19 +94,6 @@ double brightest_mm(const PlacedBone& bone, const List<View>& views) {
 }
 
 }  // namespace
-
-Eigen::Vector3d common_centre_mm(const List<View>& views) {
-  Eigen::Matrix3d sum = 1e-9 * Eigen::Matrix3d::Identity();  // so that a single view has a centre, too
-  Eigen::Vector3d right = Eigen::Vector3d::Zero();
-  for (const View& view : views) {
-    const Eigen::Vector3d along =
-        ray_direction(view.camera, {0.5 * (view.camera.width_px - 1), 0.5 * (view.camera.height_px - 1)});
-    const Eigen::Matrix3d across = Eigen::Matrix3d::Identity() - along * along.transpose();
-    sum += across;
-    right += across * source_position_mm(view.camera);
-  }
-  return solve_symmetric<3>(sum, right);
-}
 
 const View& PlacedCase::view(const std::string& name) const {
   if (const View* found = views.find(name)) return *found;

@@ -4,14 +4,11 @@
 #include <algorithm>
 #include <cmath>
 
-#include "marrow/base/error.hpp"
 #include "marrow/base/file_names.hpp"
-#include "marrow/base/number_text.hpp"
 #include "marrow/base/printable.hpp"
-#include "marrow/base/text_file.hpp"
 #include "marrow/runtime/node/types.hpp"
 #include "marrow/runtime/pipeline/pipeline_names.hpp"
-#include "marrow/runtime/run/verdict_json.hpp"
+#include "marrow/runtime/run/verdicts.hpp"
 #include "marrow/toolbox/files/atomic_write.hpp"
 #include "marrow/toolbox/files/yaml_text.hpp"
 #include "new/templates.hpp"

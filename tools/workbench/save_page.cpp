@@ -2,10 +2,8 @@
 // The requests of the page "Case" about its draft: changing it, undo and redo, and saving it as a case.
 #include "marrow/base/printable.hpp"
 #include "marrow/base/text_file.hpp"
-#include "workbench/case_text.hpp"
-#include "workbench/ct_requests.hpp"
-#include "workbench/files_of_case.hpp"
-#include "workbench/kept_comments.hpp"
+#include "workbench/case_files.hpp"
+#include "workbench/ct.hpp"
 
 namespace fs = std::filesystem;
 

@@ -1,17 +1,69 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 // What all pages of `marrow open` work with, and how they run pipelines.
-#include <map>
-#include <string>
-#include <vector>
+#include <condition_variable>
+#include <opencv2/core.hpp>
+#include <thread>
 
+#include "marrow/domain/camera.hpp"
 #include "marrow/runtime/run/executor.hpp"
 #include "workbench/drafts.hpp"
-#include "workbench/jobs.hpp"
-#include "workbench/opened_folder.hpp"
 #include "workbench/server.hpp"
 
+namespace CLI {
+class App;
+}
+
 namespace marrow::workbench {
+
+// Work that takes longer than a request. It runs in its own thread, and the page asks for its progress.
+
+/// The reports of a running job. Methods may be called from several threads.
+class Job {
+ public:
+  Job(std::string title, std::string command) : title_(std::move(title)), command_(std::move(command)) {}
+
+  /// Set when the user wants it to stop.
+  const std::atomic<bool>& stopped() const { return stopped_; }
+  void stop() { stopped_ = true; }
+  /// Adds an event for the page, such as {"event": "finished", "node": "edges"}.
+  void tell(nlohmann::json event);
+  /// "done" with a result, "failed" with a text, or "stopped".
+  void end(const std::string& state, nlohmann::json result, const std::string& error);
+  /// {title, command, state, events, next, result, error} with the events from number `since` on. Waits until there is
+  /// something new, but at most `wait_ms`.
+  nlohmann::json state(std::size_t since, int wait_ms) const;
+
+ private:
+  const std::string title_, command_;
+  std::atomic<bool> stopped_ = false;
+  mutable std::mutex mutex_;
+  mutable std::condition_variable changed_;
+  std::vector<nlohmann::json> events_;
+  std::string state_ = "running", error_;
+  nlohmann::json result_;
+};
+
+class Jobs {
+ public:
+  /// Stops all jobs and waits for them.
+  ~Jobs();
+  /// Starts a job in its own thread and returns its name. What `work` returns is the job's result; an exception makes
+  /// it fail. `command` does the same in a shell, or is empty. Throws Error if too many jobs are running.
+  std::string start(const std::string& title, const std::string& command, std::function<nlohmann::json(Job&)> work);
+  /// Throws Error if there is no such job.
+  std::shared_ptr<Job> find(const std::string& name) const;
+
+ private:
+  struct Running {
+    std::shared_ptr<Job> job;
+    std::thread thread;
+    std::shared_ptr<std::atomic<bool>> is_over;
+  };
+  mutable std::mutex mutex_;
+  std::map<std::string, Running> jobs_;
+  int count_ = 0;
+};
 
 struct Workbench {
   explicit Workbench(const std::filesystem::path& opened) : folder(opened) {}
@@ -68,5 +120,27 @@ void add_pipeline_page(Server& server, Workbench& workbench);
 void add_results_page(Server& server, Workbench& workbench);
 void add_xray_page(Server& server, Workbench& workbench);
 void add_place_page(Server& server, Workbench& workbench);
+
+/// Adds the command `open` with its options, its help and its callback, which sets `code` to the exit code.
+void add_open(CLI::App& app, int& code);
+
+// Values as the pages get them: JSON, and bytes of pixels and surfaces.
+
+/// [x, y, z]
+nlohmann::json json_of(const Eigen::Vector3d& vector);
+/// A 4 x 4 matrix as rows.
+nlohmann::json json_of(const RigidTransform& target_from_source);
+/// {intrinsics, camera_from_world, width_px, height_px} with matrices as rows.
+nlohmann::json json_of(const Camera& camera);
+
+/// The coordinates of the points, one point after the other.
+std::vector<float> floats_of(const std::vector<Eigen::Vector3d>& points);
+/// The items as they are in memory.
+template <class Item>
+std::string bytes_of_items(const std::vector<Item>& items) {
+  return {reinterpret_cast<const char*>(items.data()), items.size() * sizeof(Item)};
+}
+/// The pixels, row after row without gaps.
+std::string bytes_of_pixels(const cv::Mat& pixels);
 
 }  // namespace marrow::workbench

@@ -1,14 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 // What the requests about X-rays share: the files that pipelines read, and what is shown of a run.
-#include <string>
-#include <vector>
 
-#include "marrow/domain/camera.hpp"
 #include "marrow/toolbox/files/camera_file.hpp"
-#include "workbench/value_json.hpp"
 #include "workbench/workbench.hpp"
-#include "workbench/working_files.hpp"
 
 namespace marrow::workbench {
 
@@ -16,14 +11,6 @@ namespace marrow::workbench {
 /// keys in `camera` itself, or the camera of another program's file if `camera` has the keys for that. Throws Error if
 /// there is no camera, or if it cannot be read.
 std::filesystem::path camera_file(const Workbench& workbench, const nlohmann::json& camera, const std::string& image);
-
-/// The camera of a view, with the distortion that is still in its image. Only marrow's own files hold one; for others
-/// the result is empty. Throws Error if it cannot be read.
-files::CameraInFile distorted_camera(const Workbench& workbench, const nlohmann::json& camera,
-                                     const std::string& image);
-
-/// A camera as a draft's document has it.
-nlohmann::json camera_json(const Camera& camera);
 
 /// The overrides that name these views, a list of {name, image, camera}, for the node `views` of a pipeline.
 std::vector<Override> overrides_of(const Workbench& workbench, const nlohmann::json& views);
@@ -37,13 +24,8 @@ struct Ran {
 Ran run(const PipelineCall& call, const Workbench& workbench);
 Ran run(const NodeCall& call, const Workbench& workbench);
 
-/// The call that reads an image alone. `image` is relative to the opened folder.
-NodeCall image_call(const Workbench& workbench, const std::string& image);
-
 /// Each function adds a part of the requests.
-void add_xray_views(Server& server, Workbench& workbench);
 void add_xray_checks(Server& server, Workbench& workbench);
-void add_xray_masks(Server& server, Workbench& workbench);
 void add_xray_exchange(Server& server, Workbench& workbench);
 void add_xray_export(Server& server, Workbench& workbench);
 

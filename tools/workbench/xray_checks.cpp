@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 // The check of the cameras of a draft's views, and the pose that its landmarks give.
-#include "marrow/base/number_text.hpp"
-#include "marrow/domain/pose.hpp"
 #include "workbench/xray.hpp"
 
 namespace marrow::workbench {

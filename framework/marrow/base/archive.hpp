@@ -14,7 +14,6 @@
 #include <vector>
 
 #include "marrow/base/error.hpp"
-#include "marrow/base/export.hpp"
 #include "marrow/base/fields.hpp"
 #include "marrow/base/large_memory.hpp"
 
@@ -107,6 +106,20 @@ class Packer : public Archive {
  public:
   void bytes(const void* data, std::size_t size) override { packed.append(static_cast<const char*>(data), size); }
   std::string packed;
+};
+
+/// Counts the bytes, and passes them on if there is somewhere to.
+class ByteCounter : public Archive {
+ public:
+  explicit ByteCounter(Archive* out = nullptr) : out_(out) {}
+  void bytes(const void* data, std::size_t size) override {
+    if (out_) out_->bytes(data, size);
+    count += size;
+  }
+  std::uint64_t count = 0;
+
+ private:
+  Archive* out_;
 };
 
 /// Reads the values that were added to an Archive, in the same order and with the same types. Throws Error if the bytes

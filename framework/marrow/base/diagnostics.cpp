@@ -7,7 +7,6 @@
 #include <sstream>
 #include <tuple>
 
-#include "marrow/base/characters.hpp"
 #include "marrow/base/number_text.hpp"
 #include "marrow/base/printable.hpp"
 

@@ -4,7 +4,6 @@
 #include <string>
 #include <vector>
 
-#include "marrow/base/export.hpp"
 #include "marrow/base/names.hpp"
 
 namespace MARROW_EXPORT marrow {

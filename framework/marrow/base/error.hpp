@@ -20,4 +20,20 @@ class Cancelled : public std::exception {
   const char* what() const noexcept override { return "cancelled"; }
 };
 
+/// The message of the exception that is being handled. Plugins may throw anything: the type is named if it is not a
+/// std::exception.
+std::string reason_of_exception();
+
+/// Thrown if the system does not start another process or thread, for example because of a limit. This is a fault of
+/// the environment and not of a node.
+class NoProcess : public Error {
+ public:
+  using Error::Error;
+};
+
+/// How often a call of a node, or a whole run, failed for this reason in this process. A comparison must not count this
+/// as a failure of a method.
+long calls_without_process();
+void note_call_without_process();
+
 }  // namespace marrow

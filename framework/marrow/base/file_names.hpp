@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 // Names that people choose and that become names of files and folders.
+#include <filesystem>
 #include <string>
 #include <vector>
 
 #include "marrow/base/diagnostics.hpp"
-#include "marrow/base/export.hpp"
 
 namespace MARROW_EXPORT marrow {
 
@@ -26,5 +26,10 @@ std::string file_name_of(const std::string& text);
 
 /// The names of a list's items, made distinct: a name that was there before gets (2), (3) and so on.
 std::vector<std::string> distinct_names(const std::vector<std::string>& names);
+
+/// The path without '.', and without '..' if this does not change its meaning. A '..' is removed together with the
+/// folder before it, if that folder exists and is not a link. After a link, '..' stays, because the system goes up from
+/// the target of the link.
+std::filesystem::path plain_path(const std::filesystem::path& path);
 
 }  // namespace marrow

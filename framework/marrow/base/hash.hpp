@@ -5,8 +5,6 @@
 #include <string>
 
 #include "marrow/base/archive.hpp"
-#include "marrow/base/export.hpp"
-#include "marrow/base/fields.hpp"
 
 namespace MARROW_EXPORT marrow {
 

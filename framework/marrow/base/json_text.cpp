@@ -9,7 +9,7 @@
 namespace marrow {
 namespace {
 
-constexpr int kMostLevels = 64;
+constexpr int kMostJsonLevels = 64;
 
 /// How deep lists and objects are nested. Brackets inside texts do not count.
 int levels_of(const std::string& text) {
@@ -48,8 +48,8 @@ void take_apart(nlohmann::json& value) {
 JsonDocument::~JsonDocument() { take_apart(value_); }
 
 nlohmann::json parse_json(const std::string& text, const std::string& what) {
-  if (levels_of(text) > kMostLevels)
-    throw Error(formatted("{}: lists and objects are nested more than {} deep", what, kMostLevels));
+  if (levels_of(text) > kMostJsonLevels)
+    throw Error(formatted("{}: lists and objects are nested more than {} deep", what, kMostJsonLevels));
   try {
     return nlohmann::json::parse(text);
   } catch (const nlohmann::json::parse_error& fault) {

@@ -2,7 +2,6 @@
 #pragma once
 #include <string>
 
-#include "marrow/base/export.hpp"
 #include "marrow/base/hash.hpp"
 
 namespace MARROW_EXPORT marrow {
@@ -14,5 +13,9 @@ Digest machine_digest();
 
 /// The widest instruction set of this machine that libraries may choose at run time.
 std::string cpu_level();
+
+/// How many of the `wanted` threads a run can start besides this one. A limit of the system may allow fewer or none;
+/// TBB would then end the program. If more than one can be started, one is left for the process that reads files.
+int threads_to_be_had(int wanted);
 
 }  // namespace marrow

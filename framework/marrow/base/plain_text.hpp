@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 #include <string>
+#include <string_view>
 
 #include "marrow/base/export.hpp"
 
@@ -13,5 +14,8 @@ std::string plain_text(std::string bytes);
 
 /// Whether the bytes begin with the byte order mark of UTF-16, in either order.
 bool begins_as_utf16(const std::string& bytes);
+
+/// Encodes bytes as base64 text (RFC 4648, with padding).
+std::string base64(std::string_view bytes);
 
 }  // namespace marrow

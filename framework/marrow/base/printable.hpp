@@ -24,4 +24,29 @@ std::string cut(std::string_view text, std::size_t most = 80);
 /// The text in single quotes, shortened by cut().
 std::string in_quotes(std::string_view text);
 
+// The characters of a text in UTF-8.
+
+struct Character {
+  std::size_t size = 1;  ///< bytes
+  char32_t code = 0;
+  bool is_valid = false;  ///< well-formed UTF-8: no overlong form, no surrogate, nothing above U+10FFFF
+};
+
+/// The first character of a text that is not empty. A byte that is not UTF-8 counts as a character.
+Character first_character(std::string_view text);
+
+/// Whether a byte of UTF-8 continues a character.
+constexpr bool goes_on(char byte) { return (static_cast<unsigned char>(byte) & 0xC0) == 0x80; }
+
+/// C0, DEL, C1, line separators, and characters that change the direction of writing.
+bool is_control(char32_t code);
+
+/// Whether nothing is drawn for a character: joiners, fillers, selectors, a soft hyphen, a byte order mark.
+bool is_unseen(char32_t code);
+
+/// The first character by which a name could differ from another that looks the same, as "U+200B, which cannot be
+/// seen"; empty if there is none. These are control characters, characters that are not drawn, blanks other than the
+/// space, and combining marks. Unicode can write the same name with such marks (NFD) and without them (NFC).
+std::string odd_character_in(std::string_view name);
+
 }  // namespace marrow

@@ -3,12 +3,14 @@
 // Reads files that someone else may have put there.
 #include <sys/stat.h>
 
+#include <sys/types.h>
+#include <time.h>
 #include <cstdint>
 #include <filesystem>
+#include <optional>
 #include <string>
 
 #include "marrow/base/descriptor.hpp"
-#include "marrow/base/export.hpp"
 #include "marrow/base/hash.hpp"
 
 namespace MARROW_EXPORT_TO_TESTS marrow {
@@ -42,5 +44,32 @@ Digest file_digest(const std::filesystem::path& file);
 /// The whole content. Throws Error, with a text that begins with a verb, if the file has more than `most_bytes` or
 /// changes while it is read.
 std::string read_text(const RegularFile& file, std::size_t most_bytes);
+
+/// What distinguishes two states of a file. A write changes the time of the file's last change, which no program can
+/// set. If the file is mapped into memory, only the first write after write_back() changes it.
+struct FileState {
+  dev_t device = 0;
+  ino_t number = 0;
+  off_t size = 0;
+  timespec written{}, changed{};
+  bool operator==(const FileState& other) const;
+  void add_to(Hasher& hasher) const;
+};
+
+/// Nothing if the file is not there.
+std::optional<FileState> state_of(const std::filesystem::path& file);
+
+/// Whether every later change of the file will show in its state. Ask before reading the file. A file that was changed
+/// just now may change again within the resolution of its time, which is at most 2 s. The clock of a network file
+/// system may differ from this host's by minutes. There the file must have been in this state for 10 minutes, or for
+/// 2 s since this process first asked. A file that exists only in memory may change without a new time.
+bool is_settled(const std::filesystem::path& file, const FileState& state);
+
+/// Throws Error, with a text that begins with a verb, if the file is not a whole ELF library for this machine. With
+/// such a file, the dynamic loader would fail with an unclear message or crash.
+void check_elf(const RegularFile& file);
+
+/// The build id that the linker writes into each ELF file as a note; empty if there is none or the file is damaged.
+std::string build_note(const RegularFile& file);
 
 }  // namespace marrow

@@ -9,7 +9,6 @@
 #include <vector>
 
 #include "marrow/base/diagnostics.hpp"
-#include "marrow/base/export.hpp"
 
 namespace MARROW_EXPORT marrow {
 
@@ -68,5 +67,15 @@ class StrictYaml {
 /// fault ("the pipeline file").
 std::optional<std::string> read_source(const std::filesystem::path& file, const std::string& what,
                                        Diagnostics& diagnostics);
+
+struct Unclosed {
+  char mark;  ///< { [ " or '
+  int line;   ///< 1-based
+  int column;
+};
+
+/// The innermost bracket or quote of a YAML text that is opened but not closed, or that is closed by another kind of
+/// bracket.
+std::optional<Unclosed> last_unclosed(const std::string& text);
 
 }  // namespace marrow

@@ -9,7 +9,6 @@
 #include <map>
 #include <sstream>
 
-#include "marrow/base/characters.hpp"
 #include "marrow/base/number_text.hpp"
 #include "marrow/base/printable.hpp"
 

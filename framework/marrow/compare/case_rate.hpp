@@ -4,7 +4,6 @@
 #include <map>
 #include <string>
 
-#include "marrow/base/export.hpp"
 #include "marrow/compare/statistics.hpp"
 
 namespace MARROW_EXPORT marrow {

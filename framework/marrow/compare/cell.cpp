@@ -1,20 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "marrow/compare/cell.hpp"
 
-#include <algorithm>
 #include <cmath>
-#include <set>
 
 #include "cell_parts.hpp"
 #include "experiment_figures.hpp"
 #include "marrow/base/number_text.hpp"
-#include "marrow/base/remove_tree.hpp"
+#include "marrow/base/temporary_folder.hpp"
 #include "marrow/base/text_file.hpp"
-#include "marrow/domain/pose.hpp"
 #include "marrow/runtime/node/types.hpp"
 #include "marrow/runtime/pipeline/pipeline_names.hpp"
 #include "marrow/runtime/run/run_folder.hpp"
-#include "marrow/runtime/run/verdicts.hpp"
 #include "marrow/runtime/store/digest_memory.hpp"
 #include "marrow/runtime/store/shared_store.hpp"
 

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
+#include <array>
 #include <filesystem>
 #include <map>
 #include <memory>
@@ -8,12 +9,9 @@
 #include <string>
 #include <vector>
 
-#include "marrow/base/export.hpp"
-#include "marrow/compare/cell_pose.hpp"
 #include "marrow/compare/experiment.hpp"
 #include "marrow/domain/verdict.hpp"
-#include "marrow/runtime/run/executor.hpp"
-#include "marrow/runtime/run/run_recipe.hpp"
+#include "marrow/runtime/run/replay.hpp"
 
 namespace MARROW_EXPORT marrow {
 namespace compare {
@@ -21,6 +19,22 @@ namespace compare {
 /// The part of a cell's key that is the same on machines with other processors. Rows that such machines made belong to
 /// the same comparison, although their last digits may differ.
 std::string key_without_machine(const std::string& key);
+
+/// A pose that a cell found.
+struct CellPose {
+  std::string output;                ///< the pipeline's name of it
+  std::string item;                  ///< its place along the axes, as "distal"; empty if the output is no list
+  std::string target, source;        ///< the frames between which the matrix leads, as "world" and "ct"
+  std::array<double, 12> matrix{};   ///< the first three rows of the 4 x 4 matrix, row by row; translations in mm
+  std::optional<Judgement> verdict;  ///< the worst of the verdicts on this item, or on the whole run; nothing without
+  std::optional<double> failure_probability;  ///< the largest known one of these
+  /// One predicted standard deviation: rotations about [deg] and translations along [mm] three axes. Empty if none was
+  /// predicted. Nothing for a direction that the images do not determine.
+  std::vector<std::optional<double>> deviations;
+  bool has_bone_axes = false;  ///< the axes are the bone's frontal, lateral and long ones; else the model's x, y and z
+
+  bool operator==(const CellPose&) const = default;
+};
 
 /// The result of one cell.
 struct CellRow {

@@ -4,9 +4,7 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
-#include "marrow/base/hash.hpp"
-#include "marrow/compare/cell_pose.hpp"
-#include "marrow/runtime/run/executor.hpp"
+#include "marrow/compare/cell.hpp"
 #include "marrow/runtime/run/verdicts.hpp"
 
 namespace marrow::compare {

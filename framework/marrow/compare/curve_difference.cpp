@@ -3,13 +3,13 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <numbers>
 #include <numeric>
 
-#include "distributions.hpp"
 #include "marrow/base/error.hpp"
-#include "value_checks.hpp"
+#include "marrow/base/number_text.hpp"
+#include "marrow/domain/quantile.hpp"
+#include "marrow/domain/random.hpp"
 
 namespace marrow::compare {
 namespace {
@@ -104,6 +104,104 @@ struct Raster {
   }
 };
 
+constexpr std::size_t kDraws = 4999;
+constexpr double kOutside = 0.05;
+
+struct Moments {
+  double mean = 0, squares = 0;  ///< of the deviations from the mean
+};
+
+Moments moments_at(const std::vector<std::vector<double>>& trials, std::size_t time) {
+  Moments result;
+  const double n = double(trials.size());
+  for (const std::vector<double>& trial : trials) result.mean += trial[time] / n;
+  double largest = 0;
+  for (const std::vector<double>& trial : trials) {
+    result.squares += std::pow(trial[time] - result.mean, 2);
+    largest = std::max(largest, std::abs(trial[time]));
+  }
+  if (std::sqrt(result.squares / n) <= 1e-12 * largest) result.squares = 0;  // equal but for rounding
+  return result;
+}
+
+/// The largest |t| over all times in each draw.
+std::vector<double> largest_t(const std::vector<std::vector<double>>& deviations, const std::vector<double>& squares,
+                              std::uint64_t seed) {
+  const double n = double(deviations.size());
+  std::vector<double> all(kDraws), sums(squares.size());
+  for (std::size_t draw = 0; draw < kDraws; ++draw) {
+    Random random(seed, draw);
+    std::fill(sums.begin(), sums.end(), 0.0);
+    for (const std::vector<double>& trial : deviations) {
+      const double sign = random.uniform() < 0.5 ? -1 : 1;
+      for (std::size_t k = 0; k < sums.size(); ++k) sums[k] += sign * trial[k];
+    }
+    for (std::size_t k = 0; k < sums.size(); ++k) {
+      const double left = std::max(squares[k] - sums[k] * sums[k] / n, 1e-12 * squares[k]);
+      if (squares[k] > 0) all[draw] = std::max(all[draw], std::abs(sums[k]) / std::sqrt(n * left / (n - 1)));
+    }
+  }
+  return all;
+}
+
+constexpr double kGap = std::numeric_limits<double>::quiet_NaN();
+constexpr double kSameTime = 0.05, kEqual = 0.001;  // of a step: on one raster, and where one is interpolated
+constexpr double kFarthest = 1.5;                   // steps between two neighbours
+constexpr double kSameStep = 0.001;                 // relative
+
+double step_of(const Curve& curve, const char* which) {
+  if (curve.at.size() != curve.values.size())
+    throw Error(formatted("the {} curve has {} times and {} values", which, curve.at.size(), curve.values.size()));
+  if (curve.at.size() < 2)
+    throw Error(formatted("the {} sequence has {}; a comparison over time needs at least two", which,
+                          counted(curve.at.size(), "frame")));
+  std::vector<double> steps;
+  for (std::size_t i = 1; i < curve.at.size(); ++i) steps.push_back(curve.at[i] - curve.at[i - 1]);
+  for (std::size_t i = 0; i < steps.size(); ++i)
+    if (!(steps[i] > 0))
+      throw Error(formatted("the times of the {} sequence do not rise: {} comes after {}", which,
+                            short_number(curve.at[i + 1], 9), short_number(curve.at[i], 9)));
+  return quantile_in_place(steps, 0.5);
+}
+
+void expect_overlap(const Curve& first, const Curve& second, double tolerance) {
+  if (second.at.front() <= first.at.back() + tolerance && first.at.front() <= second.at.back() + tolerance) return;
+  throw Error(formatted("the two sequences do not overlap: the first is from {} to {}, the second from {} to {}",
+                        short_number(first.at.front(), 6), short_number(first.at.back(), 6),
+                        short_number(second.at.front(), 6), short_number(second.at.back(), 6)));
+}
+
+/// Whether all times of both lie at whole steps from each other. A list of times that begins anywhere else, or whose
+/// step is another one, leaves the raster somewhere.
+bool on_one_raster(const Curve& first, const Curve& second, double step) {
+  const auto is_on = [&](double at) {
+    const double steps = (at - first.at.front()) / step;
+    return std::abs(steps - std::round(steps)) <= kSameTime;
+  };
+  return std::all_of(first.at.begin(), first.at.end(), is_on) && std::all_of(second.at.begin(), second.at.end(), is_on);
+}
+
+/// The curve's value at a time.
+double value_at(const Curve& curve, double at, double step, double tolerance, bool& interpolates) {
+  const auto after = std::lower_bound(curve.at.begin(), curve.at.end(), at - tolerance * step);
+  if (after == curve.at.end()) return kGap;
+  const std::size_t i = std::size_t(after - curve.at.begin());
+  if (curve.at[i] <= at + tolerance * step) return curve.values[i];
+  if (i == 0 || curve.at[i] - curve.at[i - 1] > kFarthest * step) return kGap;
+  const double before = curve.values[i - 1], part = (at - curve.at[i - 1]) / (curve.at[i] - curve.at[i - 1]);
+  interpolates = true;
+  return before + part * (curve.values[i] - before);  // std::lerp may hide a NaN
+}
+
+std::vector<double> times_of_either(const Curve& first, const Curve& second, double step) {
+  std::vector<double> both;
+  std::merge(first.at.begin(), first.at.end(), second.at.begin(), second.at.end(), std::back_inserter(both));
+  std::vector<double> times;
+  for (const double at : both)
+    if (times.empty() || at - times.back() > 0.5 * step) times.push_back(at);
+  return times;
+}
+
 }  // namespace
 
 std::optional<MeanOfFrames> mean_of_frames(const std::vector<double>& values, double confidence) {
@@ -175,6 +273,69 @@ CurveDifference difference_of(const PairedCurves& pair) {
   const double half = z_of_tail(0.025) * *result.deviation;
   result.agreement = Interval{result.bias - half, result.bias + half, 0.95};
   return result;
+}
+
+CurveBand mean_band(const std::vector<std::vector<double>>& trials, std::uint64_t seed) {
+  if (trials.size() < kFewestTrials)
+    throw Error(formatted("a band over trials needs at least {}, got {}", kFewestTrials, trials.size()));
+  const std::size_t times = trials.front().size();
+  for (const std::vector<double>& trial : trials)
+    if (trial.size() != times)
+      throw Error(formatted("the trials have curves of unlike length: {} and {} times", times, trial.size()));
+  const double n = double(trials.size());
+  CurveBand band;
+  band.trials = trials.size();
+  std::vector<double> errors, squares;
+  std::vector<std::vector<double>> deviations(trials.size());
+  for (std::size_t time = 0; time < times; ++time) {
+    const Moments at = moments_at(trials, time);
+    band.mean.push_back(at.mean);
+    errors.push_back(std::sqrt(at.squares / (n - 1) / n));
+    if (!std::isfinite(at.mean)) continue;
+    squares.push_back(at.squares);
+    for (std::size_t i = 0; i < trials.size(); ++i) deviations[i].push_back(trials[i][time] - at.mean);
+  }
+  const double most = quantile(largest_t(deviations, squares, seed), 1 - kOutside);
+  const double pointwise = student_quantile(kOutside, n - 1);
+  for (const double error : errors) {
+    band.pointwise.push_back(pointwise * error);
+    band.simultaneous.push_back(std::max(most, pointwise) * error);
+  }
+  return band;
+}
+
+std::optional<Interval> mean_of_trials(const std::vector<double>& values) {
+  if (values.size() < 2) return std::nullopt;
+  std::vector<std::vector<double>> trials;
+  for (const double value : values) trials.push_back({value});
+  const Moments all = moments_at(trials, 0);
+  const double n = double(values.size());
+  const double half = student_quantile(kOutside, n - 1) * std::sqrt(all.squares / (n - 1) / n);
+  return Interval{all.mean - half, all.mean + half, 1 - kOutside};
+}
+
+PairedCurves pair_curves(const Curve& first, const Curve& second) {
+  const double step_first = step_of(first, "first"), step_second = step_of(second, "second");
+  PairedCurves pair;
+  pair.step = std::max(step_first, step_second);
+  expect_overlap(first, second, kSameTime * std::min(step_first, step_second));
+  const bool same_step = std::abs(step_first - step_second) <= kSameStep * pair.step;
+  const bool first_is_slower = step_first > step_second || same_step;
+  const bool same_raster = same_step && on_one_raster(first, second, step_first);
+  const double tolerance = same_raster ? kSameTime : kEqual;
+  if (same_raster)
+    pair.at = times_of_either(first, second, pair.step);
+  else
+    pair.at = first_is_slower ? first.at : second.at;
+  bool of_first = false, of_second = false;
+  for (const double at : pair.at) {
+    pair.first.push_back(value_at(first, at, step_first, tolerance, of_first));
+    pair.second.push_back(value_at(second, at, step_second, tolerance, of_second));
+    pair.difference.push_back(pair.second.back() - pair.first.back());
+  }
+  if (of_first || of_second)
+    pair.interpolated = of_second ? PairedCurves::Interpolated::second : PairedCurves::Interpolated::first;
+  return pair;
 }
 
 }  // namespace marrow::compare

@@ -1,15 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 #include <array>
+#include <cstddef>
 #include <filesystem>
 #include <optional>
 #include <string>
 #include <utility>
 #include <vector>
 
-#include "marrow/base/export.hpp"
 #include "marrow/compare/stop_rule.hpp"
-#include "marrow/compare/swept_option.hpp"
 #include "marrow/runtime/pipeline/pipeline.hpp"
 
 namespace MARROW_EXPORT marrow {
@@ -112,6 +111,38 @@ inline constexpr std::size_t kMostCells = 1000000;
 inline constexpr std::size_t kMostMetrics = 1000;
 inline constexpr std::size_t kMostComparisons = 20000;  ///< of pairs, with 'compare_all'
 
+/// An option whose numbers are tried over a range.
+struct SweptOption {
+  std::string key;  ///< node.option
+  std::array<double, 2> range{};
+  bool is_log = false;    ///< spread evenly over the logarithm
+  bool is_whole = false;  ///< rounded to whole numbers
+  Place place;
+
+  /// The value at a fraction, 0 to 1, of the range.
+  double value_at(double fraction) const;
+  /// The fraction of the range at which a value lies; 0 below it, 1 above it.
+  double fraction_of(double value) const;
+};
+
+/// How numbers of options are chosen: an optimizer tries points on the first cases, the training cases. The others are
+/// held out: on them the chosen point is compared with the variants of the file.
+struct TuneRule {
+  std::vector<SweptOption> options;
+  std::size_t variant = 0;  ///< the one whose options are tuned
+  std::size_t metric = 0;   ///< the figure whose mean over the training cases and starts is made as good as possible
+  double failed_as = 0;     ///< counts for a failed run in that mean, and for a worse one; a magnitude for nearest_zero
+  std::string optimizer;    ///< name of the node that chooses the points
+  std::vector<std::pair<std::string, std::string>> optimizer_options;  ///< as texts in YAML
+  Place optimizer_place;
+  std::size_t points = 0;  ///< the most that the optimizer may try
+  std::size_t training_cases = 0;
+
+  /// The values of the options at fractions of their ranges, rounded to about a thousandth of the range. So names are
+  /// short, and points that are nearly equal become one.
+  std::vector<double> values_at(const std::vector<double>& fractions) const;
+};
+
 struct Experiment {
   std::string name, help;
   std::filesystem::path file;
@@ -185,6 +216,20 @@ void keep_held_out_cases(Experiment& experiment);
 /// those of the file. Their seeds follow the file's largest seed.
 Experiment read_experiment(const std::filesystem::path& file, const Catalogue& catalogue, Diagnostics& diagnostics,
                            std::size_t more_cases = 0);
+
+/// The comparisons that an experiment makes: one for each figure of each variant beside the baseline, or of each pair
+/// with 'compare_all'. If an optimizer chooses options, the tuned variant is another one, and only the cases that are
+/// held out count.
+struct ComparisonCounts {
+  std::size_t comparisons = 0, cases = 0;
+  /// The fewest cases with which one of them can reach p < 0.05 (fewest_cases); 0 without comparisons.
+  std::size_t fewest_cases = 0;
+};
+ComparisonCounts comparison_counts(const Experiment& experiment);
+
+/// What an experiment cannot show although it can run, in sentences: differences with too few cases, a rule under
+/// 'stop' that can never be met, a capture range without success. It takes some milliseconds for each look of the rule.
+std::vector<std::string> notes_of(const Experiment& experiment);
 
 }  // namespace compare
 }  // namespace marrow

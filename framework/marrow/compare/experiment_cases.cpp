@@ -1,21 +1,24 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <sys/stat.h>
 
+#include <fnmatch.h>
 #include <algorithm>
 #include <charconv>
+#include <climits>
 #include <cmath>
+#include <cstddef>
+#include <filesystem>
 #include <map>
+#include <string>
+#include <vector>
 
-#include "experiment_layers.hpp"
 #include "experiment_sections.hpp"
-#include "folder_search.hpp"
-#include "marrow/base/error.hpp"
 #include "marrow/base/file_names.hpp"
 #include "marrow/base/number_text.hpp"
-#include "marrow/base/plain_path.hpp"
 #include "marrow/base/printable.hpp"
 
 namespace marrow::compare {
+
 namespace {
 
 namespace fs = std::filesystem;
@@ -30,6 +33,64 @@ bool read_range_of_seeds(const std::string& text, std::uint64_t& first, std::uin
   const auto rest = std::from_chars(begin.ptr + 2, end, last);
   return rest.ec == std::errc() && rest.ptr == end && last <= std::uint64_t(INT64_MAX);
 }
+
+/// Whether a name of a path holds a wildcard.
+bool is_pattern(const std::string& name) { return name.find_first_of("*?[\\") != std::string::npos; }
+
+/// Finds the paths that match a pattern such as data/*/ct. Unlike glob(3), it says what it could not read, and it ends
+/// even if links form a circle.
+class FolderSearch {
+ public:
+  /// The existing paths that match `pattern`, sorted. The search starts at `folder`, whose name is not a pattern even
+  /// if it holds a '*'. A name that begins with a dot is matched only by a pattern that begins with a dot. Throws Error
+  /// if a folder cannot be read, if the path is longer than any may be, or if all calls together have looked at more
+  /// than kMostLookedAt files and folders.
+  std::vector<fs::path> matches(const fs::path& folder, const fs::path& pattern) {
+    if (const std::size_t size = (folder / pattern).native().size(); size >= PATH_MAX)
+      throw Error(formatted("the path has {} bytes, more than any path may have", size));
+    std::vector<fs::path> found{pattern.is_absolute() ? pattern.root_path() : folder};
+    for (const fs::path& part : pattern.relative_path()) {
+      if (part.empty()) continue;  // the part after a slash at the end
+      std::vector<fs::path> next;
+      for (const fs::path& one : found) {
+        if (is_pattern(part.string())) {
+          for (fs::path& match : inside(one, part.string())) next.push_back(std::move(match));
+          continue;
+        }
+        look();
+        std::error_code error;
+        if (fs::symlink_status(one / part, error).type() != fs::file_type::not_found) next.push_back(one / part);
+      }
+      found = std::move(next);
+    }
+    std::sort(found.begin(), found.end());
+    return found;
+  }
+
+ private:
+  static constexpr std::size_t kMostLookedAt = 300000;
+
+  std::vector<fs::path> inside(const fs::path& folder, const std::string& name) {
+    std::vector<fs::path> found;
+    std::error_code error;
+    if (!fs::is_directory(folder, error)) return found;
+    fs::directory_iterator at(folder, error);
+    for (const fs::directory_iterator end; !error && at != end; at.increment(error)) {
+      look();
+      if (fnmatch(name.c_str(), at->path().filename().c_str(), FNM_PERIOD) == 0) found.push_back(at->path());
+    }
+    if (error) throw Error("the folder " + folder.string() + " cannot be read: " + error.message());
+    return found;
+  }
+
+  void look() {
+    if (++looked_at_ > kMostLookedAt)
+      throw Error(formatted("the search goes through more than {} files and folders; do links lead in a circle?",
+                            kMostLookedAt));
+  }
+
+  std::size_t looked_at_ = 0;
+};
 
 class CaseReader {
  public:

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "experiment_figures.hpp"
 
-#include <algorithm>
-
 #include "marrow/base/number_text.hpp"
 #include "marrow/compare/cell.hpp"
 #include "marrow/runtime/node/types.hpp"

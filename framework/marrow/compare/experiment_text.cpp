@@ -6,8 +6,6 @@
 #include <set>
 
 #include "draw.hpp"
-#include "experiment_layers.hpp"
-#include "marrow/base/characters.hpp"
 #include "marrow/base/file_names.hpp"
 #include "marrow/base/number_text.hpp"
 #include "marrow/base/printable.hpp"

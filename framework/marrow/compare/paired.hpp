@@ -5,7 +5,6 @@
 #include <string>
 #include <vector>
 
-#include "marrow/base/export.hpp"
 #include "marrow/compare/statistics.hpp"
 
 // A variant compared with the reference on the same cases. A run without a figure counts as a failure, and failures
@@ -86,7 +85,7 @@ SignedRank signed_rank_test(const std::vector<double>& differences,
 struct Comparison {
   Tally runs, cases;
   double median_difference = 0;   ///< median_of_differences; positive if the variant's value is larger; may be infinite
-  Interval interval;              ///< order_statistic_interval (median_interval.hpp) of the differences
+  Interval interval;              ///< order_statistic_interval (bootstrap.hpp) of the differences
   std::size_t cases_of_both = 0;  ///< cases with runs that both have, whoever lost others
   std::optional<double> median_of_both;  ///< median over these; nothing without any
   SignedRank test;
@@ -154,4 +153,33 @@ std::string effect_sentence(const std::string& variant, const std::string& refer
                             const Comparison& comparison);
 
 }  // namespace compare
+
+namespace compare {
+
+/// How differences scatter over cases: their standard deviation about the mean. Infinite ones, which failures make, are
+/// left out. Nothing for fewer than three others.
+std::optional<double> spread_of_differences(const std::vector<double>& differences);
+
+/// The probability with which so many cases show a difference of this size, one of so many comparisons: the share of
+/// 1000 simulated experiments in which difference_shown() says so, with p times the number of comparisons (Bonferroni)
+/// and the interval at 1 - alpha. The differences of cases are normal about it, with this spread. The experiments are
+/// always the same. Throws Error for a spread below 0, or as fewest_cases() does.
+double probability_to_show(double difference, double spread, std::size_t cases, std::size_t comparisons = 1,
+                           double alpha = 0.05);
+
+inline constexpr std::size_t kMostNeededCases = 1000;
+/// The fewest cases with at least this probability; nothing if kMostNeededCases are too few. Throws Error as
+/// probability_to_show() does, and for a probability that is not within 0 to 1.
+std::optional<std::size_t> cases_to_show(double difference, double spread, std::size_t comparisons = 1,
+                                         double probability = 0.8, double alpha = 0.05);
+
+/// The least difference that so many cases show with this probability; nothing if they are too few for any. Throws
+/// Error as cases_to_show() does.
+std::optional<double> difference_to_show(double spread, std::size_t cases, std::size_t comparisons = 1,
+                                         double probability = 0.8, double alpha = 0.05);
+
+}  // namespace compare
+
 }  // namespace marrow
+
+// How many cases a difference takes, planned from the cases that there are.

@@ -3,7 +3,6 @@
 #include <cmath>
 #include <optional>
 
-#include "distributions.hpp"
 #include "marrow/base/error.hpp"
 #include "marrow/base/number_text.hpp"
 #include "marrow/compare/paired.hpp"

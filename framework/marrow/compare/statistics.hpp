@@ -1,7 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 #include <cstddef>
+#include <limits>
+#include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "marrow/base/export.hpp"
@@ -74,4 +77,60 @@ CaptureRange capture_range(const std::vector<StartOutcome>& outcomes, double bin
 std::vector<double> holm(const std::vector<double>& p_values);
 
 }  // namespace compare
+
+namespace compare {
+
+/// Groups of a ranking as letters (the compact letter display; Piepho 2004, J Comput Graph Stat 13:456): two things
+/// share a letter if and only if no test tells them apart. `different` holds the pairs that a test tells apart. The
+/// first thing has "a", and letters follow in the order of the first thing that has them.
+///
+/// Groups are the largest sets of which no pair differs. Nothing if there are more of them than letters, which is so
+/// only if many pairs differ in a pattern that is no order. Throws Error for a pair that names a thing that is not
+/// there, or one thing twice.
+std::optional<std::vector<std::string>> letters_of_groups(
+    std::size_t things, const std::vector<std::pair<std::size_t, std::size_t>>& different);
+
+}  // namespace compare
+
 }  // namespace marrow
+
+namespace marrow::compare {
+
+// The beta, Student's and the normal distribution by Boost.Math, under the names that the statistics use, and the
+// interval that follows from the normal one.
+
+/// A difference that a failure makes, or a bound that too few cases leave open.
+inline constexpr double kInfinite = std::numeric_limits<double>::infinity();
+
+/// I_x(a, b), the regularized incomplete beta function (Olver et al. 2010, NIST Handbook of Mathematical Functions,
+/// section 8.17). a and b are positive. For whole k < n, it is the probability of at most k heads in n throws of a fair
+/// coin with a = n - k, b = k + 1 and x = 0.5.
+double incomplete_beta(double a, double b, double x);
+
+/// The x with I_x(a, b) = p. p is between 0 and 1.
+double beta_quantile(double p, double a, double b);
+
+/// The t for which Student's t with `freedom` degrees of freedom is farther from 0 with the probability `outside`.
+double student_quantile(double outside, double freedom);
+
+/// Probability that a standard normal variable is larger than z.
+double upper_tail(double z);
+
+/// The z with upper_tail(z) = tail; 40 for a tail too small for a double.
+double z_of_tail(double tail);
+
+/// Wilson's interval of a rate that was seen in `runs` independent runs, which need not be a whole number.
+Interval score_interval(double rate, double runs, double confidence);
+
+// Checks of the values and settings of quantiles and their intervals.
+
+/// Throws Error for no values, or for one that is not finite. `what` is the word for one value in the message.
+void check_finite(const std::vector<double>& values, const std::string& what);
+/// The same, but values may be infinite.
+void check_numbers(const std::vector<double>& values, const std::string& what);
+/// Throws Error for a confidence that is not between 0 and 1.
+void check_confidence(double confidence);
+/// Throws Error if there are too few for bounds.
+void check_resamples(std::size_t resamples);
+
+}  // namespace marrow::compare

@@ -8,7 +8,6 @@
 #include <vector>
 
 #include "marrow/base/archive.hpp"
-#include "marrow/base/export.hpp"
 #include "marrow/domain/list.hpp"
 
 namespace MARROW_EXPORT marrow {

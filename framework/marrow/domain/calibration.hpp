@@ -6,8 +6,6 @@
 #include <array>
 #include <string>
 
-#include "marrow/base/export.hpp"
-#include "marrow/base/fields.hpp"
 #include "marrow/domain/camera.hpp"
 
 namespace MARROW_EXPORT marrow {

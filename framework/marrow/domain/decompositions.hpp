@@ -28,6 +28,14 @@ Eigen::Matrix<double, Size, 1> solve_symmetric(const Eigen::Matrix<double, Size,
 /// The inverse of a symmetric positive definite matrix by the LDL^T decomposition.
 Eigen::Matrix<double, 6, 6> inverse_of_symmetric(const Eigen::Matrix<double, 6, 6>& matrix);
 
+/// The inverse of a matrix by its LU decomposition with partial pivoting. The matrix must be square and regular.
+Eigen::MatrixXd inverse_of(const Eigen::MatrixXd& matrix);
+
+/// The x that makes terms * x nearest to `right`, by a QR decomposition with column pivoting. `terms` has at least as
+/// many rows as columns, and `right` has as many rows as `terms`.
+Eigen::VectorXd least_squares(const Eigen::MatrixXd& terms, const Eigen::VectorXd& right);
+Eigen::MatrixXd least_squares(const Eigen::MatrixXd& terms, const Eigen::MatrixXd& right);
+
 /// The orthogonal matrix that is nearest to `matrix` in the Frobenius norm: U V^T of the singular value decomposition.
 /// It is a rotation if the determinant of `matrix` is positive.
 Eigen::Matrix3d nearest_orthogonal(const Eigen::Matrix3d& matrix);

@@ -11,7 +11,6 @@
 #include <string>
 #include <vector>
 
-#include "marrow/base/export.hpp"
 #include "marrow/domain/camera.hpp"
 #include "marrow/domain/pose.hpp"
 

@@ -37,6 +37,18 @@ class List {
     return nullptr;
   }
 
+  /// The same names with copies of the items, after change(copy, index) of each.
+  template <class Change>
+  List changed(const Change& change) const {
+    List all;
+    for (std::size_t i = 0; i < size(); ++i) {
+      T item = *items_[i];
+      change(item, i);
+      all.add(names_[i], std::move(item));
+    }
+    return all;
+  }
+
   class const_iterator {
    public:
     explicit const_iterator(const std::shared_ptr<const T>* at) : at_(at) {}

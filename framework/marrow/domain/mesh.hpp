@@ -6,7 +6,6 @@
 #include <string>
 #include <vector>
 
-#include "marrow/base/export.hpp"
 #include "marrow/base/fields.hpp"
 
 namespace MARROW_EXPORT marrow {

@@ -5,8 +5,6 @@
 #include <string>
 #include <vector>
 
-#include "marrow/base/export.hpp"
-#include "marrow/base/fields.hpp"
 #include "marrow/domain/mesh.hpp"
 #include "marrow/domain/transform.hpp"
 

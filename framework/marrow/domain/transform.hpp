@@ -4,7 +4,6 @@
 #include <Eigen/Geometry>
 #include <string>
 
-#include "marrow/base/export.hpp"
 #include "marrow/base/fields.hpp"
 
 namespace MARROW_EXPORT marrow {

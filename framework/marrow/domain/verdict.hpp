@@ -7,8 +7,6 @@
 #include <string_view>
 #include <vector>
 
-#include "marrow/base/export.hpp"
-#include "marrow/base/fields.hpp"
 #include "marrow/domain/pose.hpp"
 
 namespace MARROW_EXPORT marrow {

@@ -6,9 +6,8 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
-#include <marrow/base/error.hpp>
 #include <marrow/conformance.hpp>
-#include <marrow/runtime/node/attributes.hpp>
+#include <marrow/runtime/node/node_builder.hpp>
 #include <marrow/runtime/node/types.hpp>
 #include <marrow/runtime/plugins/catalogue.hpp>
 #include <memory>

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "marrow/camera/distortion_report.hpp"
 
-#include <algorithm>
-
 #include "marrow/base/number_text.hpp"
 #include "marrow/toolbox/draw/canvas.hpp"
 

@@ -3,7 +3,6 @@
 // What nodes that measure a distortion share: options of the fit, figures, warnings and the picture.
 #include <string>
 
-#include "marrow/domain/image.hpp"
 #include "marrow/domain/pose.hpp"
 #include "marrow/runtime/node/context.hpp"
 #include "marrow/toolbox/distortion/fit.hpp"

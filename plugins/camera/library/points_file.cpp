@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "marrow/camera/points_file.hpp"
 
-#include "marrow/base/error.hpp"
 #include "marrow/base/number_text.hpp"
 #include "marrow/toolbox/files/yaml_values.hpp"
 

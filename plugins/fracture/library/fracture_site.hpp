@@ -1,9 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 // Where two fragments of one CT face each other.
-#include <Eigen/Core>
-#include <string>
-#include <vector>
 
 #include "marrow/domain/mesh.hpp"
 

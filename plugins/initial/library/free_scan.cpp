@@ -3,12 +3,10 @@
 
 #include <oneapi/tbb/parallel_for.h>
 
-#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <limits>
 
-#include "marrow/base/dispatch.hpp"
 #include "marrow/initial/seen_space.hpp"
 
 namespace marrow::initial {

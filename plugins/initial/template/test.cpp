@@ -3,7 +3,7 @@
 
 #include <array>
 #include <cmath>
-#include <marrow/domain/c_arm.hpp>
+#include <marrow/domain/camera.hpp>
 #include <marrow/domain/features.hpp>
 #include <marrow/domain/mesh.hpp>
 #include <marrow/domain/pose.hpp>

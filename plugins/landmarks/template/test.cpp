@@ -2,9 +2,9 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <marrow/domain/c_arm.hpp>
+#include <marrow/domain/camera.hpp>
+#include <marrow/domain/features.hpp>
 #include <marrow/domain/functions.hpp>
-#include <marrow/domain/landmarks.hpp>
 #include <marrow/testing/node.hpp>
 
 namespace node_test = marrow::node_test;

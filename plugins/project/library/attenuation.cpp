@@ -3,13 +3,6 @@
 
 #include <tbb/parallel_for.h>
 
-#include <algorithm>
-#include <cmath>
-
-#include "marrow/base/error.hpp"
-#include "marrow/base/number_text.hpp"
-#include "marrow/domain/same_place.hpp"
-
 namespace marrow::rays {
 namespace {
 

@@ -1,14 +1,40 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 // The attenuation of a volume relative to water. A radiograph (DRR) is its line integral.
-#include <array>
-#include <cstdint>
-#include <vector>
+#include <cstdlib>
+#include <new>
 
 #include "marrow/plugin.hpp"
-#include "marrow/project/large_pages.hpp"
+
+#if defined(__linux__)
+#include <sys/mman.h>
+#endif
 
 namespace marrow::rays {
+
+/// Allocator for memory in pages of 2 MiB, if the system supports them. Rays jump through volumes of tens of megabytes.
+/// With pages of 4 KiB most of the time would go into address translation. Throws std::bad_alloc.
+template <class T>
+struct LargePages {
+  using value_type = T;
+  static constexpr std::size_t kPage = std::size_t(2) << 20;
+
+  LargePages() = default;
+  template <class U>
+  LargePages(const LargePages<U>&) {}
+
+  T* allocate(std::size_t count) {
+    const std::size_t bytes = (count * sizeof(T) + kPage - 1) / kPage * kPage;
+    void* memory = std::aligned_alloc(kPage, bytes);
+    if (!memory) throw std::bad_alloc();
+#if defined(__linux__)
+    madvise(memory, bytes, MADV_HUGEPAGE);  // only a hint: if it has no effect, all is slower but correct
+#endif
+    return static_cast<T*>(memory);
+  }
+  void deallocate(T* memory, std::size_t) { std::free(memory); }
+  bool operator==(const LargePages&) const { return true; }
+};
 
 /// Which voxels attenuate, and how much.
 struct AttenuationOptions {
@@ -30,8 +56,7 @@ struct Attenuation {
 
 /// Attenuation of a voxel: (HU - background_hu) / 1000, between 0 and 32.767. With a field, only the voxels of that
 /// fragment attenuate. The grid is the part of the volume's that holds all voxels that attenuate. `field` may be null.
-/// Throws Error if check_volume() refuses the volume, or if the sizes of field
-/// and volume differ.
+/// Throws Error if check_volume() refuses the volume, or if the sizes of field and volume differ.
 Attenuation attenuation_of(const Volume& volume, const SignedField* field, const AttenuationOptions& options);
 
 /// The same attenuation smoothed by a Gaussian, on a grid that holds all voxels that then attenuate.

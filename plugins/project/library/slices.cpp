@@ -4,10 +4,6 @@
 #include <tbb/parallel_for.h>
 
 #include <Eigen/LU>
-#include <algorithm>
-#include <array>
-#include <cmath>
-#include <limits>
 
 #include "resample_row.hpp"
 

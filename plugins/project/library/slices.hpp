@@ -2,9 +2,8 @@
 #pragma once
 // Computes a whole radiograph slice by slice, for all rays from one point. The factorisation of Lacroute and Levoy
 // (SIGGRAPH 1994) turns Joseph's sums (IEEE Transactions on Medical Imaging 1982) into runs along rows of voxels.
-#include <cstdint>
-#include <optional>
-#include <vector>
+#define TBB_PREVIEW_COLLABORATIVE_CALL_ONCE 1
+#include <tbb/collaborative_call_once.h>
 
 #include "marrow/project/rays.hpp"
 
@@ -51,6 +50,46 @@ class Slices {
   const Attenuation& attenuation_;
   std::vector<std::int16_t, LargePages<std::int16_t>> turned_;  ///< y fastest, then x, then z
   std::array<Stack, 3> stacks_;                                 ///< one for each axis from slice to slice
+};
+
+/// Sums of bilinear values over the slices that are perpendicular to the axis nearest to the ray's direction.
+class JosephProjector : public RayProjector {
+ public:
+  explicit JosephProjector(Attenuation attenuation) : RayProjector(std::move(attenuation)), slices_(attenuation_) {}
+
+  using RayProjector::radiograph;
+  std::vector<float> radiograph(const Camera& camera, const RigidTransform& world_from_model,
+                                const PixelGrid& grid) const override {
+    const auto values = slices_.radiograph(rays_of(camera, world_from_model, attenuation_.grid), grid);
+    return values ? *values : RayProjector::radiograph(camera, world_from_model, grid);
+  }
+
+  std::optional<RadiographExpansion> expansion(const Camera& camera, const RigidTransform& world_from_model,
+                                               const FragmentFrame& frame, const PixelGrid& grid) const override {
+    const RayMotion motion(camera, world_from_model, attenuation_.grid, frame);
+    if (auto expansion = slices_.expansion(motion, grid)) return expansion;
+    return expansion_by_rays(motion, grid,
+                             [&](const Eigen::Vector3d& direction) { return bricks().change(motion, direction); });
+  }
+
+ protected:
+  std::shared_ptr<const RadiographProjector> of(Attenuation attenuation) const override {
+    return std::make_shared<JosephProjector>(std::move(attenuation));
+  }
+  float integral(const Eigen::Vector3d& source, const Eigen::Vector3d& direction) const override {
+    return bricks().integral(source, direction);
+  }
+
+ private:
+  /// Made for the first ray that needs them: whole images do without.
+  const Bricks& bricks() const {
+    tbb::collaborative_call_once(has_bricks_, [&] { bricks_.emplace(attenuation_); });
+    return *bricks_;
+  }
+
+  const Slices slices_;
+  mutable tbb::collaborative_once_flag has_bricks_;
+  mutable std::optional<Bricks> bricks_;
 };
 
 }  // namespace marrow::rays

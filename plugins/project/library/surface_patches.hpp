@@ -6,10 +6,8 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
-#include <cstdint>
 #include <marrow/domain/mesh.hpp>
 #include <numeric>
-#include <vector>
 
 /// A surface cut into patches of up to 32 neighbouring triangles with similar normals. A whole patch can be skipped if
 /// none of its normals can be perpendicular to the line of sight. Vertices are stored once per patch, with one array

@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-#include <marrow/domain/mesh.hpp>
-#include <marrow/domain/same_place.hpp>
 #include <marrow/domain/volume.hpp>
 #include <vector>
 

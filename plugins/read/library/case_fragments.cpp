@@ -1,9 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "marrow/read/case_fragments.hpp"
 
-#include <algorithm>
-
-#include "marrow/base/number_text.hpp"
 #include "marrow/toolbox/exchange/surface_file.hpp"
 #include "marrow/toolbox/files/label_file.hpp"
 

@@ -1,12 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "marrow/robot/contact.hpp"
 
-#include <algorithm>
-#include <cmath>
-#include <limits>
-
-#include "marrow/base/error.hpp"
-
 namespace marrow::robot {
 namespace {
 

@@ -1,21 +1,61 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "marrow/run/program_call.hpp"
 
-#include <algorithm>
 #include <set>
 
-#include "marrow/base/error.hpp"
 #include "marrow/base/names.hpp"
-#include "marrow/base/number_text.hpp"
 #include "marrow/base/printable.hpp"
 #include "marrow/base/temporary_folder.hpp"
-#include "marrow/run/command_words.hpp"
+#include "marrow/run/metrics_file.hpp"
+#include "marrow/run/volume_out.hpp"
 #include "marrow/runtime/process/program.hpp"
+#include "marrow/toolbox/exchange/surface_file.hpp"
+#include "marrow/toolbox/files/atomic_write.hpp"
+#include "marrow/toolbox/files/samples_out.hpp"
 
 namespace marrow::run {
 namespace {
 
 namespace fs = std::filesystem;
+
+// The words of a command, with the places of files in them: {volume.nii.gz}.
+
+/// A place in a word: {name.format}, or {name}.
+struct Placeholder {
+  std::string name, format;
+  std::string text() const { return "{" + name + (format.empty() ? "" : "." + format) + "}"; }
+};
+
+std::string filled_word(const std::string& word, const std::function<std::string(const Placeholder&)>& file_of) {
+  std::string filled;
+  for (std::size_t at = 0; at < word.size(); ++at) {
+    if (word.compare(at, 2, "{{") == 0 || word.compare(at, 2, "}}") == 0) {
+      filled += word[at++];
+      continue;
+    }
+    if (word[at] != '{') {
+      filled += word[at];
+      continue;
+    }
+    const std::size_t end = word.find('}', at);
+    if (end == word.npos)
+      throw Error("the word " + in_quotes(word) + " of the command has a { without a }; write {{ for the character {");
+    const std::string inside = word.substr(at + 1, end - at - 1);
+    const std::size_t dot = inside.find('.');
+    filled += file_of({inside.substr(0, dot), dot == inside.npos ? "" : inside.substr(dot + 1)});
+    at = end;
+  }
+  return filled;
+}
+
+/// The words with each place replaced by what `file_of` returns for it. {{ stands for {, and }} for }. Throws Error for
+/// a { without its }.
+std::vector<std::string> filled_words(const std::vector<std::string>& words,
+                                      const std::function<std::string(const Placeholder&)>& file_of) {
+  std::vector<std::string> filled;
+  for (const std::string& word : words) filled.push_back(filled_word(word, file_of));
+  return filled;
+}
 
 /// Gives each place in the command its file, and writes the inputs that the command names.
 class Files {
@@ -49,8 +89,7 @@ class Files {
     if (!output_.empty()) return output_;
     if (!names_folder_)
       throw Error(
-          "there is an output_file, but the command does not name the folder that it is in; write "
-          "{output_folder}");
+          "there is an output_file, but the command does not name the folder that it is in; write {output_folder}");
     const fs::path file(options_.output_file);
     if (file.is_absolute() || std::find(file.begin(), file.end(), "..") != file.end())
       throw Error("output_file is " + in_quotes(options_.output_file) + ", but must be a name below {output_folder}");
@@ -135,6 +174,104 @@ void with_output(const GivenInputs& inputs, const ProgramOptions& options, const
                 in_quotes(output.filename().string()) +
                 (options.output_file.empty() ? "" : " in {output_folder}; " + files.found()) + printed_by_program(end));
   read(output);
+}
+
+namespace {
+
+const std::map<std::string, std::vector<std::string>>& formats() {
+  static const std::map<std::string, std::vector<std::string>> all{
+      {"volume", formats_of_volumes()}, {"second_volume", formats_of_volumes()},
+      {"field", formats_of_volumes()},  {"mesh", {"stl", "ply", "obj", "vtp"}},
+      {"image", {"png", "tif"}},        {"metrics", {"json"}}};
+  return all;
+}
+
+template <class T>
+void append(std::string& bytes, const T& value) {
+  bytes.append(reinterpret_cast<const char*>(&value), sizeof value);
+}
+
+void write_field(const SignedField& field, const std::string& format, const fs::path& file) {
+  std::vector<std::uint8_t> inside(field.values_mm.size());
+  std::transform(field.values_mm.begin(), field.values_mm.end(), inside.begin(),
+                 [](float distance_mm) { return std::uint8_t(distance_mm < 0); });
+  write_volume(file, format, field.grid, inside);
+}
+
+void write_mesh(const Mesh& mesh, const std::string& format, const fs::path& file) {
+  check_mesh(mesh, "input 'mesh'");
+  files::write_plainly(file, {format == "stl"   ? stl_bytes(mesh)
+                              : format == "ply" ? ply_bytes(mesh)
+                              : format == "obj" ? exchange::obj_text(mesh)
+                                                : exchange::vtp_bytes(mesh)});
+}
+
+void write_image(const Image& image, const std::string& format, const fs::path& file) {
+  const cv::Mat pixels = image.pixels.clone();  // rows without gaps
+  if (format == "tif") {
+    cv::Mat values;
+    pixels.convertTo(values, CV_32F);
+    return files::write_float_tiff(file, values.cols, values.rows, values.ptr<float>());
+  }
+  if (pixels.depth() == CV_32F)
+    throw Error(
+        "input 'image' has grey values that are no whole numbers, and PNG has no place for them; write {image.tif}");
+  files::write_png(file, pixels.cols, pixels.rows, 1, pixels.depth() == CV_8U ? files::Sample::u8 : files::Sample::u16,
+                   pixels.data);
+}
+
+}  // namespace
+
+std::vector<std::string> names_of_inputs() { return {"volume", "second_volume", "field", "mesh", "image", "metrics"}; }
+
+std::vector<std::string> formats_of_input(const std::string& name) { return formats().at(name); }
+
+bool is_given(const GivenInputs& inputs, const std::string& name) {
+  const void* input = name == "volume"          ? static_cast<const void*>(inputs.volume)
+                      : name == "second_volume" ? inputs.second_volume
+                      : name == "field"         ? inputs.field
+                      : name == "mesh"          ? inputs.mesh
+                      : name == "image"         ? inputs.image
+                                                : static_cast<const void*>(inputs.metrics);
+  return input != nullptr;
+}
+
+void write_input(const GivenInputs& inputs, const std::string& name, const std::string& format, const fs::path& file) {
+  if (name == "volume") write_volume(file, format, inputs.volume->grid, inputs.volume->values);
+  if (name == "second_volume") write_volume(file, format, inputs.second_volume->grid, inputs.second_volume->values);
+  if (name == "field") write_field(*inputs.field, format, file);
+  if (name == "mesh") write_mesh(*inputs.mesh, format, file);
+  if (name == "image") write_image(*inputs.image, format, file);
+  if (name == "metrics") files::write_plainly(file, {metrics_text(*inputs.metrics)});
+}
+
+std::string stl_bytes(const Mesh& mesh) {
+  std::string bytes(80, ' ');
+  append(bytes, std::uint32_t(mesh.triangles.size()));
+  bytes.reserve(84 + 50 * mesh.triangles.size());
+  for (const auto& triangle : mesh.triangles) {
+    const Eigen::Vector3d &a = mesh.vertices_mm[triangle[0]], &b = mesh.vertices_mm[triangle[1]],
+                          &c = mesh.vertices_mm[triangle[2]];
+    const Eigen::Vector3d normal = (b - a).cross(c - a).normalized();
+    for (const Eigen::Vector3d& vector : {normal, a, b, c})
+      for (const double part : vector) append(bytes, float(part));
+    append(bytes, std::uint16_t(0));
+  }
+  return bytes;
+}
+
+std::string ply_bytes(const Mesh& mesh) {
+  std::string bytes = formatted(
+      "ply\nformat binary_little_endian 1.0\nelement vertex {}\nproperty double x\nproperty double y\nproperty double "
+      "z\nelement face {}\nproperty list uchar int vertex_indices\nend_header\n",
+      mesh.vertices_mm.size(), mesh.triangles.size());
+  for (const Eigen::Vector3d& vertex : mesh.vertices_mm)
+    for (const double coordinate : vertex) append(bytes, coordinate);
+  for (const auto& triangle : mesh.triangles) {
+    append(bytes, std::uint8_t(3));
+    for (const std::uint32_t corner : triangle) append(bytes, std::int32_t(corner));
+  }
+  return bytes;
 }
 
 }  // namespace marrow::run

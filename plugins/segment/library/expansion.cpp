@@ -4,7 +4,6 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 
 #include "marrow/segment/fragments.hpp"
@@ -12,8 +11,7 @@
 namespace marrow::segment {
 namespace {
 
-using marrow::Grid;
-using marrow::Volume;
+using marrow::Grid, marrow::Volume;
 
 constexpr int kBlock = 32;
 constexpr std::uint8_t kStopped = 255;

@@ -7,7 +7,6 @@
 // there is no bone. Dijkstra's algorithm over the six neighbours of each voxel finds the front that arrives first. It
 // needs no array of arrival times. Later steps find the exact position of the surface.
 #include <cstdint>
-#include <vector>
 
 #include "marrow/domain/volume.hpp"
 

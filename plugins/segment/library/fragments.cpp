@@ -4,15 +4,12 @@
 #include <algorithm>
 #include <cmath>
 
-#include "marrow/base/error.hpp"
 #include "marrow/toolbox/field/interior.hpp"
 
 namespace marrow::segment {
 namespace {
 
-using marrow::Grid;
-using marrow::SignedField;
-using marrow::Volume;
+using marrow::Grid, marrow::SignedField, marrow::Volume;
 
 /// The box around a fragment's voxels, with a margin. Its size is 0 if there are none.
 Mask box_of(const Grid& grid, const std::vector<std::uint8_t>& owner, std::uint8_t fragment, int margin) {

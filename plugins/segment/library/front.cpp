@@ -3,11 +3,7 @@
 
 #include <tbb/parallel_for.h>
 
-#include <algorithm>
-#include <cmath>
-
 #include "halo.hpp"
-#include "marrow/base/dispatch.hpp"
 
 namespace marrow::segment {
 namespace {

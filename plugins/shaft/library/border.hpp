@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 // A border: a straight line in an image with a bright and a dark side, and the edge pixels that support it.
-#include <Eigen/Core>
 #include <marrow/domain/features.hpp>
+#include <opencv2/core.hpp>
+#include <optional>
 #include <utility>
-#include <vector>
 
 namespace marrow::shaft {
 
@@ -59,5 +59,37 @@ Stretch common_stretch(const EdgeMap& edges, const Border& one, const Border& ot
 /// ridge or another fragment. Runs of them shorter than gap_px do not count.
 Stretch stretch_at_outline(const EdgeMap& edges, const Border& one, const Border& other, const Support& support,
                            const Stretch& stretch, double reach_px, double gap_px);
+
+// The brightness of the image at a pair of borders: bone is darker than its surroundings along its whole length.
+
+/// Mean grey values inside a pair, and in strips from 1 to 4 mm outside its borders. A region outside the image has the
+/// value infinity, which never contradicts bone.
+struct Brightness {
+  double inside = 0, outside_left = 0, outside_right = 0;
+};
+Brightness brightness_of(const cv::Mat& image, const Border& left, const Border& right, const Stretch& stretch,
+                         double pixel_mm);
+
+/// The step of brightness at a pair of borders. For each border it is the mean of (outside - inside) / (outside +
+/// inside) along the stretch, at least 0. The result is the geometric mean of both borders.
+double step_of(const cv::Mat& image, const Border& left, const Border& right, const Stretch& stretch, double pixel_mm);
+
+/// The longest part of a stretch in which the image darkens across both borders, each by at least 0.3 of `bone_step`,
+/// the step of this image's bone. Borders of muscle and fat are fainter than that. Where a bowed bone leaves the line,
+/// there is no step. Interruptions shorter than `gap_px` do not count. The length is 0 if there is no such part.
+Stretch stretch_with_steps(const cv::Mat& image, const Border& left, const Border& right, const Stretch& stretch,
+                           double bone_step, double pixel_mm, double gap_px);
+
+// Finds the outline of a round bone from its edges.
+
+/// Distance in pixels, along a border's normal, from the edge pixels of a stretch to the bone's outline. The
+/// attenuation of a round bone begins with a vertical tangent at its outline. Blur, by the detector and by the edge
+/// extractor, moves its steepest point inwards by about three quarters of the blur's standard deviation. So the profile
+/// across the border is fitted with the blurred chord of a cylinder of this width; position and blur are free.
+/// std::nullopt if this does not fit: the best position is at the end of the range that is tried (as at a ridge), the
+/// attenuation does not increase inwards, or there are too few edge pixels.
+std::optional<double> outline_beyond_edges_px(const cv::Mat& image, const EdgeMap& edges, const Border& border,
+                                              const Support& support, const Stretch& stretch, double width_px,
+                                              double pixel_mm);
 
 }  // namespace marrow::shaft

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <gtest/gtest.h>
 
-#include <marrow/domain/c_arm.hpp>
+#include <marrow/domain/camera.hpp>
 #include <marrow/domain/features.hpp>
 #include <marrow/testing/node.hpp>
 

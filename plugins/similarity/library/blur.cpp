@@ -5,10 +5,9 @@
 #include <array>
 #include <cmath>
 #include <optional>
-#include <vector>
 
 #include "marrow/domain/quantile.hpp"
-#include "marrow/toolbox/image/line_integrals.hpp"
+#include "marrow/toolbox/image/grey_values.hpp"
 
 namespace marrow::image {
 namespace {

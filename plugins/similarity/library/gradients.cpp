@@ -4,7 +4,6 @@
 #include <cmath>
 
 #include "marrow/similarity/intensity.hpp"
-#include "moments.hpp"
 
 namespace marrow::match {
 

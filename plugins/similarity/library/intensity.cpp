@@ -3,18 +3,10 @@
 
 #include <tbb/parallel_for.h>
 
-#include <algorithm>
-#include <cmath>
-#include <map>
 #include <mutex>
 #include <opencv2/imgproc.hpp>
 
-#include "intensity_expansions.hpp"
-#include "marrow/base/error.hpp"
-#include "marrow/domain/camera.hpp"
-#include "marrow/domain/functions.hpp"
-#include "marrow/toolbox/image/line_integrals.hpp"
-#include "marrow/toolbox/match/among_others.hpp"
+#include "intensity.hpp"
 #include "marrow/toolbox/match/bones_together.hpp"
 #include "smoothed_at_bone.hpp"
 

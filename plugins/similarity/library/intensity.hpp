@@ -9,9 +9,8 @@
 #include <variant>
 #include <vector>
 
-#include "marrow/plugin.hpp"
 #include "marrow/similarity/expansions.hpp"
-#include "marrow/toolbox/image/grey_range.hpp"
+#include "marrow/toolbox/image/grey_values.hpp"
 
 namespace marrow::match {
 
@@ -159,5 +158,19 @@ void declare(Node& node) {
               unit("steps"))
       .option("weights", &Options::weights, "weight of each view; none: all the same");
 }
+
+// The values of measures, and their quadratic models.
+
+double value_of(const Measure& measure, const Patch& patch, double step_px, const Blocks& blocks);
+
+bool has_derivatives(const Measure& measure);
+
+/// For a measure that has derivatives and a patch with slopes. `worst` counts where the patch is empty or the measure
+/// is not finite.
+ViewsCost::ViewExpansion expansion_of(const Measure& measure, const Patch& patch, double step_px, const Blocks& blocks,
+                                      double worst);
+
+/// sum += share * more.
+void add(const Cost::Expansion& more, double share, Cost::Expansion& sum);
 
 }  // namespace marrow::match

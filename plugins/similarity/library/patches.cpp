@@ -1,11 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "marrow/similarity/patches.hpp"
 
-#include <algorithm>
-#include <cmath>
 #include <opencv2/core/types.hpp>
-
-#include "moments.hpp"
 
 namespace marrow::match {
 namespace {

@@ -10,10 +10,6 @@
 #include <cmath>
 #include <map>
 #include <mutex>
-#include <optional>
-
-#include "marrow/domain/functions.hpp"
-#include "marrow/domain/pose.hpp"
 
 namespace marrow::match {
 namespace {

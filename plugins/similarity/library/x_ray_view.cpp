@@ -5,7 +5,7 @@
 #include <cmath>
 #include <random>
 
-#include "marrow/toolbox/image/line_integrals.hpp"
+#include "marrow/toolbox/image/grey_values.hpp"
 
 namespace marrow::analytic {
 namespace {

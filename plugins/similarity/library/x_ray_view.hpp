@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 // A simulated X-ray image of a body, and its edges.
-#include "marrow/domain/camera.hpp"
 #include "marrow/domain/features.hpp"
 #include "marrow/domain/functions.hpp"
 
@@ -20,5 +19,23 @@ View x_ray_view(const XRay& x_ray, const std::string& name, const RadiographProj
 
 /// Edges: ridges of the gradient of the line integrals, after the smoothing that edge detectors use.
 EdgeMap edges_of(const View& view);
+
+/// Draws nothing in its region of an image, as a surface whose triangles face inwards has no outline.
+class InvisibleProjector : public OutlineProjector, public RadiographProjector {
+ public:
+  explicit InvisibleProjector(const PixelGrid& region) : region_(region) {}
+  std::vector<OutlinePoint> outline(const Camera&, const RigidTransform&, double) const override { return {}; }
+  std::vector<float> radiograph(const Camera&, const RigidTransform&, const PixelGrid& grid) const override {
+    return std::vector<float>(grid.count());
+  }
+  std::vector<float> radiograph(const Camera&, const RigidTransform&,
+                                const std::vector<Eigen::Vector2f>& pixels) const override {
+    return std::vector<float>(pixels.size());
+  }
+  PixelGrid region(const Camera&, const RigidTransform&) const override { return region_; }
+
+ private:
+  PixelGrid region_;
+};
 
 }  // namespace marrow::analytic

@@ -2,7 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <marrow/domain/c_arm.hpp>
+#include <marrow/domain/camera.hpp>
 #include <marrow/domain/functions.hpp>
 #include <marrow/testing/node.hpp>
 

@@ -3,16 +3,10 @@
 
 #include <tbb/parallel_for.h>
 
-#include <Eigen/Geometry>
-#include <algorithm>
-#include <cmath>
-#include <limits>
 #include <opencv2/imgproc.hpp>
 
-#include "marrow/base/error.hpp"
-#include "marrow/base/number_text.hpp"
 #include "marrow/domain/random.hpp"
-#include "marrow/simulate/mesh_rays.hpp"
+#include "marrow/simulate/solid.hpp"
 
 namespace marrow::phantom {
 namespace {

@@ -1,12 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 // Colour photographs of opaque bodies by a simulated camera: light, shadow, lens and sensor.
-#include <cstdint>
-#include <string>
-#include <vector>
 
-#include "marrow/domain/calibration.hpp"
-#include "marrow/domain/mesh.hpp"
 #include "marrow/plugin.hpp"
 
 namespace marrow::phantom {

@@ -3,8 +3,6 @@
 
 #include <tbb/parallel_for.h>
 
-#include <algorithm>
-#include <cmath>
 #include <unordered_map>
 
 namespace marrow::phantom {

@@ -3,14 +3,11 @@
 
 #include <tbb/parallel_for.h>
 
-#include <algorithm>
-#include <cmath>
 #include <opencv2/imgproc.hpp>
 #include <random>
 
 #include "marrow/domain/random.hpp"
 #include "marrow/simulate/solid.hpp"
-#include "marrow/toolbox/phantom/materials.hpp"
 
 namespace marrow::phantom {
 namespace {

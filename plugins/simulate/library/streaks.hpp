@@ -1,10 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 // The artefacts of metal in a CT.
-#include <cstdint>
-#include <vector>
 
-#include "marrow/domain/volume.hpp"
 #include "marrow/toolbox/phantom/phantom.hpp"
 
 namespace marrow::phantom {

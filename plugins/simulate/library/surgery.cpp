@@ -1,19 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "marrow/simulate/surgery.hpp"
 
-#include <Eigen/Geometry>
-#include <algorithm>
-#include <cmath>
-#include <limits>
-
 #include "marrow/simulate/knee.hpp"
-#include "marrow/toolbox/phantom/loft.hpp"
 
 namespace marrow::phantom {
 namespace {
 
-using Eigen::Vector2d;
-using Eigen::Vector3d;
+using Eigen::Vector2d, Eigen::Vector3d;
 
 constexpr double kReachMm = 220;  // half the length of bodies that reach beyond the images
 
@@ -23,8 +16,7 @@ Body outside(const std::string& name, const std::string& material, Mesh surface)
 
 double between(Random& random, double low, double high) { return low + (high - low) * random.uniform(); }
 
-/// How far the bone reaches to each side in x near a point of (y, z): the largest and the smallest of
-/// `lateral_x` * x.
+/// How far the bone reaches to each side in x near a point of (y, z): the largest and the smallest of `lateral_x` * x.
 std::pair<double, double> sides_at(const Mesh& outer, double lateral_x, double y, double z) {
   constexpr double kNearMm = 5;
   double farthest = -std::numeric_limits<double>::max(), nearest = -farthest;

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "marrow/toolbox/analytic/body.hpp"
 
-#include <Eigen/Geometry>
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
@@ -64,6 +63,13 @@ std::vector<Eigen::Vector3d> touching_circle(const Ellipsoid& e, const Eigen::Ve
     points.push_back(n / distance + radius * (std::cos(angle) * a + std::sin(angle) * b));
   }
   return points;
+}
+
+std::vector<Eigen::Vector2f> pixels_of(const PixelGrid& grid) {
+  std::vector<Eigen::Vector2f> pixels;
+  for (int row = 0; row < grid.rows; ++row)
+    for (int column = 0; column < grid.columns; ++column) pixels.push_back(grid.pixel(column, row).cast<float>());
+  return pixels;
 }
 
 }  // namespace
@@ -178,17 +184,6 @@ std::vector<OutlinePoint> BodyProjector::outline(const Camera& camera, const Rig
   }
   return points;
 }
-
-namespace {
-
-std::vector<Eigen::Vector2f> pixels_of(const PixelGrid& grid) {
-  std::vector<Eigen::Vector2f> pixels;
-  for (int row = 0; row < grid.rows; ++row)
-    for (int column = 0; column < grid.columns; ++column) pixels.push_back(grid.pixel(column, row).cast<float>());
-  return pixels;
-}
-
-}  // namespace
 
 std::vector<float> BodyProjector::radiograph(const Camera& camera, const RigidTransform& world_from_model,
                                              const PixelGrid& grid) const {

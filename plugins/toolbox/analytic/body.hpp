@@ -5,7 +5,6 @@
 #include <vector>
 
 #include "marrow/domain/functions.hpp"
-#include "marrow/domain/mesh.hpp"
 #include "marrow/domain/volume.hpp"
 
 namespace marrow::analytic {

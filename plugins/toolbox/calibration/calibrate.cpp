@@ -71,7 +71,7 @@ std::optional<ClosedForm> closed_form_camera(const ViewPoints& view, const Eigen
       right[at] = seen[i][k] * depth;
     }
   }
-  const Eigen::Vector2d solution = system.colPivHouseholderQr().solve(right);
+  const Eigen::Vector2d solution = least_squares(system, right);
   if (!solution.allFinite() || solution[0] == 0) return std::nullopt;
   ClosedForm camera;
   camera.focal_px = std::abs(solution[0]);
@@ -155,12 +155,12 @@ void add_deviations(const std::vector<ViewPoints>& views, const CalibrationModel
       squares += view.residuals_px.back().squaredNorm();
       count += 2;
     }
-    pose_inverse.push_back(pose.inverse());
+    pose_inverse.push_back(inverse_of(pose));
     coupling.push_back(pose_inverse.back() * both);
     reduced -= both.transpose() * coupling.back();
   }
   const double variance = squares / std::max(1.0, count - double(inner) - 6 * double(views.size()));
-  const Eigen::MatrixXd covariance = reduced.inverse();
+  const Eigen::MatrixXd covariance = inverse_of(reduced);
   Eigen::VectorXd deviation = Eigen::VectorXd::Zero(7);
   for (Eigen::Index k = 0; k < inner; ++k) deviation[columns[std::size_t(k)]] = std::sqrt(variance * covariance(k, k));
   if (model.square_pixels) deviation[1] = deviation[0];

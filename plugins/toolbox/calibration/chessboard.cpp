@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "marrow/toolbox/calibration/chessboard.hpp"
 
-#include <Eigen/Geometry>
 #include <algorithm>
 #include <opencv2/calib3d.hpp>
 #include <opencv2/imgproc.hpp>

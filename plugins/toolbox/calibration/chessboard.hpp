@@ -3,8 +3,7 @@
 // A chessboard for the calibration of cameras for visible light.
 #include <vector>
 
-#include "marrow/domain/image.hpp"
-#include "marrow/domain/transform.hpp"
+#include "marrow/domain/camera.hpp"
 
 namespace marrow::calibration {
 

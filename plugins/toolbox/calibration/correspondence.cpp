@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "marrow/toolbox/calibration/correspondence.hpp"
+#include "marrow/toolbox/calibration/board.hpp"
 
 #include <Eigen/Dense>
 #include <algorithm>

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "marrow/toolbox/calibration/plausibility.hpp"
 
-#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <functional>
@@ -9,7 +8,7 @@
 #include <opencv2/calib3d.hpp>
 
 #include "marrow/base/number_text.hpp"
-#include "marrow/toolbox/files/length_units.hpp"
+#include "marrow/toolbox/files/camera_file.hpp"
 
 namespace marrow::calibration {
 namespace {
@@ -365,6 +364,22 @@ std::optional<Refit> refit_pose(const Camera& camera, const SeenPoints& points) 
   for (const auto& p : points.world_mm) centre += p / double(points.world_mm.size());
   return Refit{error, degrees(geodesic_angle_rad(moved.camera_from_world.rotation, camera.camera_from_world.rotation)),
                (moved.camera_from_world * centre - camera.camera_from_world * centre).norm()};
+}
+
+std::string doubtful_focal_length(const Calibration& calibration, const std::string& views) {
+  constexpr double kRefused = 0.1, kDoubtful = 0.01;
+  for (const int i : {0, 1}) {
+    const double focal_px = calibration.intrinsics(i, i), deviation_px = calibration.focal_deviation_px[i];
+    if (deviation_px <= kDoubtful * focal_px) continue;
+    const std::string text =
+        views + formatted(
+                    " hardly tell the focal length: it is {:.0f} px, known to {:.0f} px (one standard deviation); take "
+                    "the board tilted by 20 degrees or more, to another side in each",
+                    focal_px, deviation_px);
+    if (!(deviation_px <= kRefused * focal_px)) throw Error(text);
+    return text;
+  }
+  return "";
 }
 
 }  // namespace marrow::calibration

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "marrow/domain/camera.hpp"
+#include "marrow/domain/calibration.hpp"
 
 namespace marrow::calibration {
 
@@ -51,5 +51,10 @@ std::optional<RigidTransform> pose_of_points(const Camera& camera, const SeenPoi
 /// Fits only the pose to the points, from the camera's pose. std::nullopt if there are fewer than six points, if they
 /// do not determine a pose, or if no better pose is found.
 std::optional<Refit> refit_pose(const Camera& camera, const SeenPoints& points);
+
+/// Views of a board that is never tilted do not determine the focal length, although noise gives it a value. Throws
+/// Error if its standard deviation is more than a tenth of it. Returns a warning if it is more than a hundredth, else
+/// an empty text. `views` names what the calibration is from, such as "the photographs".
+std::string doubtful_focal_length(const Calibration& calibration, const std::string& views);
 
 }  // namespace marrow::calibration

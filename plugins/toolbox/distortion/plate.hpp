@@ -1,17 +1,84 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 // A planar plate with a regular grid of dots or holes in an image, and where a straight image would show its dots.
+#include <Eigen/Core>
+#include <opencv2/core.hpp>
 #include <optional>
 #include <string>
 #include <vector>
 
-#include "marrow/domain/image.hpp"
-#include "marrow/toolbox/distortion/plate_dots.hpp"
-#include "marrow/toolbox/distortion/plate_grid.hpp"
-#include "marrow/toolbox/distortion/plate_points.hpp"
-#include "marrow/toolbox/distortion/plate_tilt.hpp"
+#include "marrow/toolbox/distortion/distortion.hpp"
 
 namespace marrow::distortion {
+
+/// A spot in an image that may be a dot or hole of a plate, and how much it stands out from its surroundings, in grey
+/// values. `roundness` is the smaller curvature of its peak divided by the larger one; a dot that the border of the
+/// field cuts is not round.
+struct Spot {
+  Eigen::Vector2d at_px = Eigen::Vector2d::Zero();
+  double strength = 0, roundness = 1;
+};
+
+/// All spots whose radius is about `radius_px`, the most central first. A spot is a maximum of the difference of two
+/// Gaussians (Lowe, IJCV 2004, section 3), which no slow change of brightness moves. It must stand out from what is
+/// usual in its neighbourhood. At most 20,000 are given. `grey` must be finite.
+std::vector<Spot> find_spots(const cv::Mat1f& grey, double radius_px, bool is_bright);
+
+/// Finds which spots lie near a place.
+class NearbySpots {
+ public:
+  /// `cell_px` is about the distance between spots. The spots must outlive this.
+  NearbySpots(const std::vector<Spot>& spots, double cell_px);
+
+  /// The index of the nearest spot within the reach, or -1.
+  int nearest(const Eigen::Vector2d& place, double reach_px) const;
+  /// Indices of all spots within the reach, by their distance.
+  std::vector<int> within(const Eigen::Vector2d& place, double reach_px) const;
+
+ private:
+  std::pair<int, int> cell_of(const Eigen::Vector2d& place) const;
+
+  const std::vector<Spot>& spots_;
+  double cell_px_;
+  int columns_ = 0, rows_ = 0;
+  std::vector<std::vector<int>> cells_;
+};
+
+/// square: rows and columns. hexagonal: each dot has six neighbours.
+enum class Pattern { square, hexagonal };
+
+/// A dot of the plate: its column and row in the grid, counted from any dot, and the spot that shows it. In a hexagonal
+/// grid the rows are the lines at 60 degrees.
+struct GridDot {
+  int column = 0, row = 0, spot = 0;
+};
+
+/// Where a dot is on the plate, in units of the distance between neighbours. Rows and columns go round as u and v do.
+Eigen::Vector2d place_on_plate(Pattern grid, int column, int row);
+
+/// The largest part of the spots that is a grid. It grows from a dot to its neighbours, over single missing dots, and
+/// then to dots beside known ones where a polynomial through all others expects them. Parts that an instrument
+/// separates are joined where a polynomial through both tells how their rows continue, and left out elsewhere. A plate
+/// may be turned, mirrored and tilted by up to 45 degrees. Empty if fewer than nine spots are a grid, or if neighbours
+/// do not confirm it.
+std::vector<GridDot> find_grid(const std::vector<Spot>& spots, Pattern grid);
+
+/// The distance between neighbours: the median over the dots.
+double spacing_px(const std::vector<Spot>& spots, const std::vector<GridDot>& dots, Pattern grid);
+
+/// How exactly the dots were located, as far as neighbours tell: the median distance of a dot from the middle of two
+/// opposite neighbours. A smooth distortion hardly changes it.
+double unevenness_px(const std::vector<Spot>& spots, const std::vector<GridDot>& dots, Pattern grid);
+
+/// How a tilted plate would look without distortion.
+struct PlateTilt {
+  std::vector<Eigen::Vector2d> places;  ///< of the dots, in pixels, up to place, turn and size
+  double perspective_px = 0;            ///< by which perspective moves what lies half an image from the middle
+  double deviation_px = 0;              ///< standard deviation of that
+
+  /// Three deviations or more.
+  bool is_certain() const { return perspective_px > 3 * deviation_px; }
+};
 
 struct PlateSearch {
   std::optional<Pattern> grid;    ///< nothing: the one of which more dots are found

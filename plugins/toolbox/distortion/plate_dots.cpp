@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "marrow/toolbox/distortion/plate_dots.hpp"
+#include "marrow/toolbox/distortion/plate.hpp"
 
 #include <Eigen/LU>
 #include <algorithm>

@@ -6,18 +6,16 @@
 
 #include "marrow/base/diagnostics.hpp"
 #include "marrow/base/error.hpp"
-#include "marrow/base/names.hpp"
 #include "marrow/base/number_text.hpp"
 #include "marrow/base/printable.hpp"
 #include "marrow/toolbox/files/header_lines.hpp"
-#include "marrow/toolbox/files/input_file.hpp"
 
 namespace marrow::exchange {
 namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::uint64_t kMostBytes = 1u << 20;
+constexpr std::uint64_t kMostBytesOfTrial = 1u << 20;
 
 /// RenderingResolution: as Autoscoper's documentation once called it.
 const std::vector<std::string> kPassedOver{"RenderResolution", "RenderingResolution", "OptimizationOffsets",
@@ -25,7 +23,7 @@ const std::vector<std::string> kPassedOver{"RenderResolution", "RenderingResolut
 const std::vector<std::string> kRead{"Version",    "mayaCam_csv", "CameraRootDir", "VolumeFile",
                                      "VolumeFlip", "VoxelSize",   "MeshFile"};
 
-struct Line {
+struct TrialLine {
   int number;
   std::string key, value;
 };
@@ -34,7 +32,7 @@ struct Line {
 class TrialText {
  public:
   explicit TrialText(const fs::path& path) : path_(path) {
-    const std::string text = files::read_text(path, kMostBytes);
+    const std::string text = files::read_text(path, kMostBytesOfTrial);
     faults_.remember(path.string(), text);
     std::istringstream stream(text);
     std::string line;
@@ -48,16 +46,16 @@ class TrialText {
     }
   }
 
-  std::vector<Line> with_key(const std::string& key) const {
-    std::vector<Line> found;
+  std::vector<TrialLine> with_key(const std::string& key) const {
+    std::vector<TrialLine> found;
     std::copy_if(lines_.begin(), lines_.end(), std::back_inserter(found),
-                 [&](const Line& one) { return one.key == key && !one.value.empty(); });
+                 [&](const TrialLine& one) { return one.key == key && !one.value.empty(); });
     return found;
   }
 
   std::vector<TrialPath> paths(const std::string& key) {
     std::vector<TrialPath> found;
-    for (const Line& line : with_key(key)) {
+    for (const TrialLine& line : with_key(key)) {
       std::string text = line.value;
       std::replace(text.begin(), text.end(), '\\', '/');
       if (text.size() > 1 && text[1] == ':')
@@ -69,7 +67,7 @@ class TrialText {
   }
 
   /// The three numbers of a line.
-  Eigen::Vector3d three(const Line& line, const std::string& expected) {
+  Eigen::Vector3d three(const TrialLine& line, const std::string& expected) {
     const std::vector<std::string> words = files::words_of(line.value);
     Eigen::Vector3d numbers = Eigen::Vector3d::Constant(1);
     bool is_good = words.size() == 3;
@@ -85,7 +83,7 @@ class TrialText {
   std::vector<std::string> unknown_lines() const {
     std::vector<std::string> known = kRead, remarks;
     known.insert(known.end(), kPassedOver.begin(), kPassedOver.end());
-    for (const Line& line : lines_) {
+    for (const TrialLine& line : lines_) {
       if (std::find(known.begin(), known.end(), line.key) != known.end()) continue;
       const std::string near = suggestion(line.key, known);
       remarks.push_back(formatted("{}:{}: the key {} is not known, so the line does not count{}", path_.string(),
@@ -94,7 +92,7 @@ class TrialText {
     return remarks;
   }
 
-  void fault(const Line& line, const std::string& text, const std::string& hint = {}) {
+  void fault(const TrialLine& line, const std::string& text, const std::string& hint = {}) {
     faults_.add({path_.string(), line.number, 1}, line.key + ": " + text, hint);
   }
   void fault(const std::string& text, const std::string& hint = {}) { faults_.add({path_.string()}, text, hint); }
@@ -104,17 +102,17 @@ class TrialText {
 
  private:
   fs::path path_;
-  std::vector<Line> lines_;
+  std::vector<TrialLine> lines_;
   Diagnostics faults_;
 };
 
 void check_version(TrialText& text) {
-  for (const Line& line : text.with_key("Version"))
+  for (const TrialLine& line : text.with_key("Version"))
     if (line.value != "1.0" && line.value != "1.1" && line.value != "1.2")
       text.fault(line, "expected 1.0, 1.1 or 1.2, got " + in_quotes(printable(line.value)));
 }
 
-std::vector<std::string> flips_of(TrialText& text, const Line& line) {
+std::vector<std::string> flips_of(TrialText& text, const TrialLine& line) {
   const Eigen::Vector3d numbers = text.three(line, "0 or 1 for each of x, y and z");
   std::vector<std::string> axes;
   for (int k = 0; k < 3; ++k) {
@@ -131,7 +129,7 @@ std::vector<TrialVolume> volumes_of(TrialText& text) {
   std::vector<TrialVolume> volumes;
   for (TrialPath& file : text.paths("VolumeFile")) volumes.push_back({std::move(file), {}, {}, {}});
   if (volumes.empty()) text.fault("there is no VolumeFile", "each bone has a line, as  VolumeFile Volumes/radius.tif");
-  const std::vector<Line> sizes = text.with_key("VoxelSize"), flips = text.with_key("VolumeFlip");
+  const std::vector<TrialLine> sizes = text.with_key("VoxelSize"), flips = text.with_key("VolumeFlip");
   const std::vector<TrialPath> meshes = text.paths("MeshFile");
   const auto check_count = [&](std::size_t count, const std::string& key, bool may_be_none) {
     if (count == volumes.size() || (count == 0 && may_be_none)) return true;

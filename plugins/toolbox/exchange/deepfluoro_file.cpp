@@ -4,7 +4,6 @@
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
-#include <opencv2/core.hpp>
 
 #include "hdf5.hpp"
 #include "marrow/base/error.hpp"

@@ -8,10 +8,8 @@
 #include <string>
 #include <vector>
 
-#include "marrow/domain/camera.hpp"
-#include "marrow/domain/landmarks.hpp"
+#include "marrow/domain/features.hpp"
 #include "marrow/domain/volume.hpp"
-#include "marrow/toolbox/exchange/camera_matrix.hpp"
 #include "marrow/toolbox/exchange/xreg_file.hpp"
 
 namespace marrow::exchange {

@@ -10,14 +10,14 @@
 #include "marrow/base/error.hpp"
 #include "marrow/base/number_text.hpp"
 #include "marrow/base/printable.hpp"
-#include "marrow/toolbox/exchange/camera_matrix.hpp"
+#include "marrow/toolbox/exchange/cameras.hpp"
 #include "marrow/toolbox/files/header_lines.hpp"
 #include "marrow/toolbox/files/yaml_text.hpp"
 
 namespace marrow::exchange {
 namespace {
 
-constexpr std::uint64_t kMostBytes = 65536;  // a rigid transform has 15 numbers
+constexpr std::uint64_t kMostBytesOfTransform = 65536;  // a rigid transform has 15 numbers
 constexpr double kFarthest_mm = 1e6;
 
 /// The three lines of the one transform, with their numbers in the file.
@@ -40,7 +40,7 @@ std::optional<std::string> value_of(const std::string& text, const std::string& 
 }
 
 Lines lines_of(const std::filesystem::path& path) {
-  std::istringstream stream(files::read_text(path, kMostBytes));
+  std::istringstream stream(files::read_text(path, kMostBytesOfTransform));
   Lines lines{path, "", "", ""};
   std::string text;
   for (std::size_t number = 1; std::getline(stream, text); ++number) {

@@ -6,13 +6,11 @@
 #include <charconv>
 #include <string_view>
 
-#include "marrow/base/error.hpp"
 #include "marrow/base/number_text.hpp"
 #include "marrow/base/printable.hpp"
 #include "marrow/toolbox/exchange/surface_file.hpp"
 #include "marrow/toolbox/files/input_file.hpp"
 #include "marrow/toolbox/files/yaml_text.hpp"
-#include "polygons_file.hpp"
 
 namespace marrow::exchange {
 namespace {

@@ -22,7 +22,7 @@
 namespace marrow::exchange {
 namespace {
 
-constexpr std::uint64_t kMostBytes = 256u << 20;
+constexpr std::uint64_t kMostBytesOfGeometry = 256u << 20;
 constexpr double kLargest = 1e7;  // no angle, no distance, and no number of a matrix of such distances is larger
 constexpr const char* kRoot = "RTKThreeDCircularGeometry";
 
@@ -172,7 +172,7 @@ class RtkReader {
 }  // namespace
 
 std::vector<RtkProjection> read_rtk(const std::filesystem::path& path) {
-  return RtkReader(path).read(files::read_bytes(path, kMostBytes));
+  return RtkReader(path).read(files::read_bytes(path, kMostBytesOfGeometry));
 }
 
 std::string rtk_geometry(const std::vector<Camera>& cameras, const Eigen::Vector2d& pixel_mm) {

@@ -2,7 +2,6 @@
 // What RTK's angles, distances and offsets mean (RTK's documentation, "RTK geometry").
 #include "marrow/toolbox/exchange/rtk_geometry.hpp"
 
-#include <Eigen/Geometry>
 #include <cmath>
 
 #include "marrow/base/error.hpp"

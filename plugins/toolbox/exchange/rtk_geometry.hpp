@@ -4,8 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "marrow/domain/camera.hpp"
-#include "marrow/toolbox/exchange/camera_matrix.hpp"
+#include "marrow/toolbox/exchange/cameras.hpp"
 
 namespace marrow::exchange {
 

@@ -4,8 +4,8 @@
 #include <filesystem>
 #include <string>
 
-#include "marrow/domain/mesh.hpp"
 #include "marrow/runtime/node/context.hpp"
+#include "marrow/toolbox/files/mesh_file.hpp"
 
 namespace marrow::exchange {
 
@@ -21,5 +21,15 @@ Mesh read_surface_file(const std::filesystem::path& path, double scale, const Co
 /// exactly the same numbers. Throw Error if check_mesh() refuses the mesh.
 std::string obj_text(const Mesh& mesh);
 std::string vtp_bytes(const Mesh& mesh);
+
+/// What an OBJ or VTP file holds.
+struct FilePolygons {
+  files::Polygons polygons;
+  files::SpaceMark space;
+};
+FilePolygons read_obj(const std::filesystem::path& path);
+FilePolygons read_vtp(const std::filesystem::path& path);
+
+constexpr std::uint64_t kMostSurfaceBytes = std::uint64_t(4) << 30;
 
 }  // namespace marrow::exchange

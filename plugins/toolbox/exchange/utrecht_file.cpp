@@ -1,15 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "marrow/toolbox/exchange/utrecht_file.hpp"
 
-#include <Eigen/Geometry>
 #include <cmath>
-#include <optional>
 #include <sstream>
 
-#include "marrow/base/error.hpp"
 #include "marrow/base/number_text.hpp"
-#include "marrow/toolbox/exchange/camera_matrix.hpp"
-#include "marrow/toolbox/files/input_file.hpp"
+#include "marrow/toolbox/exchange/cameras.hpp"
 #include "marrow/toolbox/files/samples.hpp"
 #include "marrow/toolbox/files/yaml_values.hpp"
 

@@ -10,8 +10,6 @@
 #include <vector>
 
 #include "marrow/domain/camera.hpp"
-#include "marrow/domain/list.hpp"
-#include "marrow/domain/transform.hpp"
 #include "marrow/domain/volume.hpp"
 
 namespace marrow::exchange {

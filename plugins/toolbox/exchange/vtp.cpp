@@ -16,13 +16,11 @@
 #include <limits>
 #include <stdexcept>
 
-#include "marrow/base/error.hpp"
 #include "marrow/base/number_text.hpp"
 #include "marrow/base/printable.hpp"
 #include "marrow/toolbox/exchange/surface_file.hpp"
 #include "marrow/toolbox/files/input_file.hpp"
 #include "marrow/toolbox/vtk/poly_data.hpp"
-#include "polygons_file.hpp"
 
 namespace marrow::exchange {
 namespace {

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // In the place of vtp.cpp where marrow is built without VTK. The node write.vtp is not there then.
-#include "marrow/base/error.hpp"
 #include "marrow/toolbox/exchange/surface_file.hpp"
-#include "polygons_file.hpp"
 
 namespace marrow::exchange {
 

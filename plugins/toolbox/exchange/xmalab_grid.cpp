@@ -4,7 +4,6 @@
 #include <cmath>
 #include <sstream>
 
-#include "marrow/base/error.hpp"
 #include "marrow/base/number_text.hpp"
 #include "marrow/toolbox/files/input_file.hpp"
 #include "marrow/toolbox/files/yaml_text.hpp"
@@ -12,11 +11,11 @@
 namespace marrow::exchange {
 namespace {
 
-constexpr std::uint64_t kMostBytes = 16u << 20;
+constexpr std::uint64_t kMostBytesOfGrid = 16u << 20;
 
 /// The numbers of a file's lines; empty lines are left out. Each line must have `count`.
 std::vector<std::vector<double>> rows_of(const std::filesystem::path& path, std::size_t count, const char* expected) {
-  std::istringstream lines(files::read_text(path, kMostBytes));
+  std::istringstream lines(files::read_text(path, kMostBytesOfGrid));
   std::vector<std::vector<double>> rows;
   std::string line;
   for (std::size_t number = 1; std::getline(lines, line); ++number) {

@@ -6,8 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "marrow/domain/camera.hpp"
-#include "marrow/toolbox/distortion/plate_points.hpp"
+#include "marrow/toolbox/distortion/distortion.hpp"
 
 namespace marrow::exchange {
 

@@ -6,8 +6,8 @@
 #include <fstream>
 #include <new>
 
-#include "marrow/base/atomic_file.hpp"
 #include "marrow/base/error.hpp"
+#include "marrow/base/text_file.hpp"
 
 namespace marrow::files {
 

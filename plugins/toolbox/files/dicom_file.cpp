@@ -3,7 +3,6 @@
 
 #include <algorithm>
 
-#include "byte_stream.hpp"
 #include "marrow/base/error.hpp"
 #include "marrow/base/number_text.hpp"
 #include "samples.hpp"

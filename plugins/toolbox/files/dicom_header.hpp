@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 // The values of a DICOM file without its pixels.
+#include <Eigen/Core>
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -69,5 +70,17 @@ class DicomHeader {
   const DicomFile& file_;
   int frame_;
 };
+
+inline constexpr DicomTag kPatientOrientation{0x0020, 0x0020, "PatientOrientation"};
+
+/// Which directions of the patient are to the right and down in a stored image: unit vectors in patient coordinates
+/// (LPS).
+struct PatientOrientation {
+  std::string letters;  ///< as the header has them, such as L\F
+  Eigen::Vector3d right, down;
+};
+
+/// std::nullopt if the header does not give it in letters that are known.
+std::optional<PatientOrientation> patient_orientation(const DicomHeader& header);
 
 }  // namespace marrow::files

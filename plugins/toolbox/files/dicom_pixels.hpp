@@ -56,9 +56,6 @@ void make_padding_air(const DicomPixels& pixels, float* values, std::size_t coun
 /// 4095 that is 4095.
 double sum_of_limits(const DicomPixels& pixels);
 
-/// The table in the header; std::nullopt if there is none. Throws Error if it contradicts itself.
-std::optional<DicomTable> read_dicom_table(const DicomFile& file, const DicomHeader& header);
-
 /// The values for the stored numbers, by the table or by RescaleSlope and RescaleIntercept.
 void scaled_values(const DicomPixels& pixels, const Samples& samples, float* values);
 

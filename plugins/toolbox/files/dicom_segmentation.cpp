@@ -1,16 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "dicom_segmentation.hpp"
+#include "label_file.hpp"
 
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <map>
 
-#include "dicom_object.hpp"
+#include "dicom_folder.hpp"
 #include "dicom_pixels.hpp"
 #include "marrow/base/error.hpp"
 #include "marrow/base/number_text.hpp"
-#include "volume_grid.hpp"
 
 namespace marrow::files {
 namespace {

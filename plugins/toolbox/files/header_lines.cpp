@@ -2,7 +2,6 @@
 #include "header_lines.hpp"
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 
 #include "marrow/base/error.hpp"

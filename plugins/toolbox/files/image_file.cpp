@@ -1,16 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <cstring>
 
 #include "dicom_pixels.hpp"
-#include "file_format.hpp"
-#include "marrow/base/error.hpp"
 #include "marrow/base/number_text.hpp"
 #include "marrow/toolbox/files/sequence_files.hpp"
 #include "marrow/toolbox/files/volume_file.hpp"
 #include "marrow/toolbox/files/xray_header.hpp"
-#include "samples.hpp"
 
 namespace marrow::files {
 namespace {
@@ -139,6 +137,30 @@ Samples read_pages(const fs::path& path) {
   return pages;
 }
 
+constexpr DicomTag kHorizontalFlip{0x0018, 0x7034, "FieldOfViewHorizontalFlip"};
+
+bool has_dicom_header(const std::filesystem::path& path) { return file_format(path) == FileFormat::dicom; }
+
+/// The patient's side that a direction points to most.
+std::string side_of(const Eigen::Vector3d& direction) {
+  static const char* kSides[3][2] = {{"left", "right"}, {"back", "front"}, {"head", "feet"}};
+  Eigen::Index axis = 0;
+  direction.cwiseAbs().maxCoeff(&axis);
+  return kSides[axis][direction[axis] < 0];
+}
+
+constexpr DicomTag kLossy{0x0028, 0x2110, "LossyImageCompression"};
+
+/// Headers of copies forget that their pixels were compressed, so the way they are written now counts too.
+bool is_lossy_dicom(const std::filesystem::path& path) {
+  constexpr const char* kLossySyntaxes[] = {"1.2.840.10008.1.2.4.50", "1.2.840.10008.1.2.4.51",
+                                            "1.2.840.10008.1.2.4.81", "1.2.840.10008.1.2.4.91"};
+  const DicomFile file(path);
+  return std::find(std::begin(kLossySyntaxes), std::end(kLossySyntaxes), file.transfer_syntax()) !=
+             std::end(kLossySyntaxes) ||
+         DicomHeader(file, 1).text(kLossy).value_or("") == "01";
+}
+
 }  // namespace
 
 Image turned_over(Image image, const std::string& mirror) {
@@ -170,6 +192,55 @@ std::vector<Image> read_image_frames(const fs::path& path, const FrameRange& ran
   const Samples pages = read_pages(path);
   for (const int frame : frames_of(range, pages.size[2], path.string())) images.push_back(image_of(pages, frame, path));
   return images;
+}
+
+std::vector<std::string> doubts_about_sides(const std::filesystem::path& image, int frame) {
+  if (!has_dicom_header(image)) return {};
+  const DicomFile file(image);
+  const DicomHeader header(file, std::max(1, frame));
+  const auto oriented = patient_orientation(header);
+  const std::string advice =
+      "compare it with the anatomy, or mark landmarks in two views, and mirror the image if it is";
+  if (!oriented) {
+    if (header.text(kHorizontalFlip).value_or("") != "YES") return {};
+    return {image.string() + ": was flipped left to right after it was taken (" + kHorizontalFlip.text() + "), and " +
+            kPatientOrientation.text() + " does not say how the patient lies in it; it may be mirrored: " + advice};
+  }
+  if (header.number(kPrimaryAngle) && header.number(kSecondaryAngle)) return {};  // mirrored back if it was mirrored
+  return {image.string() + ": the patient's " + side_of(oriented->right) + " is on its right and the " +
+          side_of(oriented->down) + " below (" + kPatientOrientation.text() +
+          "), but the header does not say from where it was taken; whether it is mirrored is not known: " + advice};
+}
+
+std::vector<std::string> doubts_about_sides(const std::filesystem::path& image, int frame, const Camera& camera) {
+  if (!has_dicom_header(image)) return {};
+  const DicomFile file(image);
+  const auto oriented = patient_orientation(DicomHeader(file, std::max(1, frame)));
+  if (!oriented) return doubts_about_sides(image, frame);
+  constexpr double kClear = 0.5;  // the patient's axes and the camera's differ by less than 60 degrees
+  const bool is_turned = is_mirrored_as_read(image, frame);
+  const Eigen::Vector3d right = is_turned ? Eigen::Vector3d(-oriented->right) : oriented->right;
+  const Eigen::Vector3d away = camera.camera_from_world.rotation.row(2).transpose();  // from the source
+  if (!(right.cross(oriented->down).dot(away) < -kClear)) return {};
+  return {image.string() + ": is mirrored: by its header (" + kPatientOrientation.text() + ") the patient's " +
+          side_of(right) + " is on the right and the " + side_of(oriented->down) +
+          " below, as nobody sees it from the source of this camera; mirror the image, or correct the angles"};
+}
+
+bool is_lossy_image(const std::filesystem::path& image) {
+  const FileFormat format = file_format(image);
+  return format == FileFormat::jpeg || (format == FileFormat::dicom && is_lossy_dicom(image));
+}
+
+void warn_of_pixels(const std::filesystem::path& image, const Context& context) {
+  if (is_lossy_image(image))
+    context.warn(image.string() +
+                 ": was compressed with loss (JPEG or the like): grey levels are changed a little, most where edges "
+                 "are, and may have lost bits; use the device's own file where there is one");
+  if (file_format(image) == FileFormat::nifti)
+    context.warn(image.string() +
+                 ": NIfTI does not say which row of an image is the upper one; the first that is stored is taken as "
+                 "the upper one, as ITK writes it: compare it with the anatomy, or save it as PNG");
 }
 
 }  // namespace marrow::files

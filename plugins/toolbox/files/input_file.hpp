@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 // All readers open their files here.
+#include <charconv>
 #include <cstdint>
 #include <filesystem>
+#include <memory>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -70,5 +72,42 @@ class FileWindow {
 /// Throws Error if `file` is a link that leads out of `folder` or nowhere. Inputs that are folders are compared by the
 /// content of the files in them, so a change of a file outside would not be noticed.
 void check_stays_inside(const std::filesystem::path& folder, const std::filesystem::path& file);
+
+/// A stream of samples from a file, plain or decompressed on the way. So no more memory is needed than for the samples
+/// that the header claims.
+class ByteStream {
+ public:
+  virtual ~ByteStream() = default;
+  /// Copies the next `count` bytes, or fewer at the end. Returns how many. Throws Error if the stream is damaged.
+  virtual std::size_t take(void* to, std::size_t count) = 0;
+  /// Number of bytes after the end of a compressed stream. Valid only after all of the stream was taken.
+  virtual std::uint64_t bytes_behind() const { return 0; }
+};
+
+/// The decompressed bytes of a zlib or gzip stream between two offsets. Reading to the end verifies the checksum.
+std::unique_ptr<ByteStream> unpacked_bytes(const InputFile& file, std::uint64_t begin, std::uint64_t end);
+/// The same of a Deflate stream without a header or checksum.
+std::unique_ptr<ByteStream> bare_unpacked_bytes(const InputFile& file, std::uint64_t begin, std::uint64_t end);
+/// The decompressed bytes of a gzip file, or the bytes of any other file.
+std::unique_ptr<ByteStream> bytes_of_gzip_or_plain(const InputFile& file);
+
+/// Takes `count` bytes. Throws Error if there are fewer.
+void take_all(ByteStream& stream, const InputFile& file, void* to, std::size_t count);
+/// Throws Error if bytes are left: a header that claims too little is as wrong as one that claims too much.
+void expect_end(ByteStream& stream, const InputFile& file);
+
+/// The name of an item from that of its file, in which some characters are written as in web addresses: "a%2Fb" is a/b.
+inline std::string unescaped_name(const std::string& file_name) {
+  std::string name;
+  for (std::size_t i = 0; i < file_name.size(); ++i) {
+    unsigned byte = 0;
+    const char* code = file_name.data() + i + 1;
+    const bool is_code =
+        file_name[i] == '%' && i + 2 < file_name.size() && std::from_chars(code, code + 2, byte, 16).ptr == code + 2;
+    name += is_code ? char(byte) : file_name[i];
+    if (is_code) i += 2;
+  }
+  return name;
+}
 
 }  // namespace marrow::files

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "marrow/domain/volume.hpp"
 #include "marrow/toolbox/files/input_file.hpp"
 
 namespace marrow::files {
@@ -97,5 +98,25 @@ std::vector<float> read_floats(const InputFile& file, const StoredSamples& store
 
 /// The values of the samples as float: slope * sample + intercept.
 std::vector<float> to_float(const Samples& samples);
+
+/// The grid that the header gives. Directions that are rounded are made exact.
+Grid grid_of(const Samples& samples);
+
+/// Reverses the samples along an axis (0 to 2) of the grid.
+void flip(Volume& volume, int axis);
+
+/// Reverses the last axis of a left-handed grid. Then it is right-handed, and each voxel keeps its value and its
+/// position.
+void make_right_handed(Volume& volume);
+
+/// What a file holds. Devices name their files as they like (.IMA, IM000001), so the content decides, not the name.
+enum class FileFormat { unknown, png, tiff, jpeg, bmp, dicom, meta_image, nrrd, nifti };
+
+/// The format by the file's first bytes or, if they belong to no known format, as in a damaged file, by its extension.
+/// Throws Error as InputFile does; the file may be empty.
+FileFormat file_format(const std::filesystem::path& path);
+
+/// "a GIF picture": the name of a format that is not read, if the file's first bytes tell it; else empty.
+std::string name_of_other_format(const std::filesystem::path& path);
 
 }  // namespace marrow::files

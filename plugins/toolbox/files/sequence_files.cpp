@@ -7,11 +7,10 @@
 #include <array>
 #include <cctype>
 
-#include "file_format.hpp"
 #include "header_lines.hpp"
 #include "marrow/base/error.hpp"
 #include "marrow/base/number_text.hpp"
-#include "marrow/toolbox/files/input_file.hpp"
+#include "samples.hpp"
 
 namespace marrow::files {
 namespace {

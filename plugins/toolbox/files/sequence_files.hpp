@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "marrow/domain/image.hpp"
+#include "marrow/domain/camera.hpp"
 
 namespace marrow::files {
 

@@ -3,12 +3,13 @@
 // compared with what is there.
 #include "tiff_pages.hpp"
 
+#include <tiffio.h>
 #include <algorithm>
-#include <utility>
+#include <cstdarg>
+#include <cstdio>
 
 #include "marrow/base/error.hpp"
 #include "marrow/base/number_text.hpp"
-#include "tiff_description.hpp"
 
 namespace marrow::files {
 namespace {
@@ -97,8 +98,155 @@ class Walk {
   TiffPages tiff_;
 };
 
+/// These say nothing about pixels: fields that programs add, texts without an end, fields in another order.
+bool is_harmless(const std::string& message) {
+  for (const char* part : {"Unknown field with tag", "does not end in null byte", "tags are not sorted"})
+    if (message.find(part) != std::string::npos) return true;
+  return false;
+}
+
+template <class Source>
+int keep_message(TIFF*, void* to, const char*, const char* format, va_list values) {
+  std::array<char, 300> text;
+  std::vsnprintf(text.data(), text.size(), format, values);
+  Source& source = *static_cast<Source*>(to);
+  if (source.fault.empty() && !is_harmless(text.data())) source.fault = text.data();
+  return 1;
+}
+
+template <class Source>
+tmsize_t read_source(thandle_t from, void* to, tmsize_t count) {
+  Source& source = *static_cast<Source*>(from);
+  const std::uint64_t held = source.file.size() - std::min(source.at, source.file.size());
+  const std::uint64_t bytes = std::min(std::uint64_t(count), held);
+  source.is_used_up = source.is_used_up || bytes > source.left;
+  if (source.is_used_up) return 0;
+  try {
+    source.file.read(source.at, to, std::size_t(bytes));
+  } catch (const Error& error) {  // no exception may pass through libtiff
+    source.fault = error.what();
+    return 0;
+  }
+  source.left -= bytes;
+  source.at += bytes;
+  return tmsize_t(bytes);
+}
+
+tmsize_t write_nothing(thandle_t, void*, tmsize_t) { return 0; }
+
+template <class Source>
+toff_t seek_source(thandle_t in, toff_t place, int from) {
+  Source& source = *static_cast<Source*>(in);
+  return source.at = place + (from == SEEK_CUR ? source.at : from == SEEK_END ? source.file.size() : 0);
+}
+
+int close_nothing(thandle_t) { return 0; }
+
+template <class Source>
+toff_t size_of_source(thandle_t of) {
+  return static_cast<Source*>(of)->file.size();
+}
+
+template <class T>
+T field(TIFF* tiff, std::uint32_t tag, T missing) {
+  T value = missing;
+  return TIFFGetFieldDefaulted(tiff, tag, &value) ? value : missing;
+}
+
 }  // namespace
 
 TiffPages read_tiff_pages(const InputFile& file) { return Walk(file).all(); }
+
+// libtiff reads from a file that is open already, keeps its messages, and gets no more bytes than a sound file has.
+
+struct TiffReader::Source {
+  const InputFile& file;
+  std::uint64_t at = 0;
+  std::uint64_t left = 4 * file.size() + 65536;  ///< bytes that may still be read: pages that share theirs are refused
+  std::string fault{};                           ///< the first message of libtiff
+  bool is_used_up = false;
+};
+
+TiffReader::TiffReader(const InputFile& file) : source_(new Source{file}) {
+  const std::string order = file.text(0, std::size_t(std::min<std::uint64_t>(4, file.size())));
+  using namespace std::string_view_literals;
+  if (order != "II*\0"sv && order != "MM\0*"sv && order != "II+\0"sv && order != "MM\0+"sv)
+    throw Error(file.path().string() + ": is not a TIFF file, or is damaged at its start");
+  TIFFOpenOptions* const options = TIFFOpenOptionsAlloc();
+  TIFFOpenOptionsSetMaxSingleMemAlloc(options, tmsize_t(file.size() + (16 << 20)));
+  TIFFOpenOptionsSetErrorHandlerExtR(options, keep_message<Source>, source_.get());
+  TIFFOpenOptionsSetWarningHandlerExtR(options, keep_message<Source>, source_.get());
+  tiff_ = TIFFClientOpenExt("", "rm", source_.get(), read_source<Source>, write_nothing, seek_source<Source>,
+                            close_nothing, size_of_source<Source>, nullptr, nullptr, options);
+  TIFFOpenOptionsFree(options);
+  if (!tiff_ && source_->fault.empty()) source_->fault = "its first page is not there";
+  check_pages();
+  pages_ = 1;
+}
+
+TiffReader::~TiffReader() {
+  if (tiff_) TIFFClose(tiff_);
+}
+
+void TiffReader::check_pages() const {
+  const std::string what = source_->file.path().string();
+  if (source_->is_used_up)
+    throw Error(what + ": its pages lie over each other; it is damaged: copy or export it again");
+  if (!source_->fault.empty())
+    throw Error(formatted("{}: is cut off or damaged: only {} pages are whole (libtiff: {}); copy or export it again",
+                          what, pages_, source_->fault));
+}
+
+bool TiffReader::next() {
+  const bool is_there = TIFFReadDirectory(tiff_);
+  check_pages();
+  pages_ += is_there;
+  return is_there;
+}
+
+TiffPage TiffReader::page() const {
+  TiffPage page;
+  const auto number = [&](std::uint32_t tag, auto& into) { into = field(tiff_, tag, into); };
+  number(TIFFTAG_SUBFILETYPE, page.subfile);
+  number(TIFFTAG_IMAGEWIDTH, page.width);
+  number(TIFFTAG_IMAGELENGTH, page.height);
+  number(TIFFTAG_BITSPERSAMPLE, page.bits);
+  number(TIFFTAG_COMPRESSION, page.compression);
+  number(TIFFTAG_PHOTOMETRIC, page.photometric);
+  number(TIFFTAG_FILLORDER, page.fill_order);
+  number(TIFFTAG_ORIENTATION, page.orientation);
+  number(TIFFTAG_SAMPLESPERPIXEL, page.samples);
+  number(TIFFTAG_ROWSPERSTRIP, page.rows_per_strip);
+  number(TIFFTAG_PLANARCONFIG, page.planes);
+  number(TIFFTAG_SAMPLEFORMAT, page.format);
+  page.is_tiled = TIFFIsTiled(tiff_);
+  std::uint16_t *red, *green, *blue;
+  if (page.bits <= 8 && TIFFGetField(tiff_, TIFFTAG_COLORMAP, &red, &green, &blue))
+    for (std::size_t k = 0; k < 3; ++k) {
+      const std::uint16_t* const first = std::array{red, green, blue}[k];
+      page.palette[k].assign(first, first + (1 << page.bits));
+    }
+  return page;
+}
+
+std::string TiffReader::description() const {
+  const char* text = nullptr;
+  return TIFFGetField(tiff_, TIFFTAG_IMAGEDESCRIPTION, &text) && text ? text : "";
+}
+
+void TiffReader::read_strips(const TiffPage& page, std::byte* to) {
+  const std::size_t row_bytes = page.width * page.samples_together() * (page.bits / 8u);
+  for (std::uint32_t strip = 0, row = 0; strip < TIFFNumberOfStrips(tiff_); ++strip) {
+    const std::uint32_t rows = std::min(page.rows_per_strip, page.height - row % page.height);
+    const tmsize_t bytes = tmsize_t(rows * row_bytes);
+    const bool is_whole = TIFFReadEncodedStrip(tiff_, strip, to + row * row_bytes, bytes) == bytes;
+    if (source_->is_used_up) check_pages();
+    if (!is_whole || !source_->fault.empty())
+      throw Error(source_->file.path().string() +
+                  ": is cut off or damaged: a strip of its pixels does not hold what its header claims (libtiff: " +
+                  source_->fault + "); copy or export it again");
+    row += rows;
+  }
+}
 
 }  // namespace marrow::files

@@ -1,15 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "marrow/toolbox/files/volume_file.hpp"
 
+#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 
-#include "file_format.hpp"
 #include "header_lines.hpp"
-#include "marrow/base/error.hpp"
 #include "marrow/base/number_text.hpp"
+#include "marrow/domain/decompositions.hpp"
 #include "samples.hpp"
-#include "volume_grid.hpp"
 
 namespace marrow::files {
 namespace {
@@ -84,6 +83,29 @@ void check_reading(const VolumeReading& reading) {
       throw Error(formatted("voxel_size_mm: expected positive lengths, got {:f}", length));
 }
 
+constexpr float kLeastOfBone = 1200;  ///< in HU + 1024, for the brightest voxel
+
+/// How many of the values lie in a range.
+double share(const std::vector<float>& values, float least, float most) {
+  const auto count = std::count_if(values.begin(), values.end(), [&](float v) { return v >= least && v <= most; });
+  return values.empty() ? 0 : double(count) / double(values.size());
+}
+
+bool seems_to_have_offset(const Volume& volume) {
+  std::vector<float> above;
+  float highest = 0;
+  for (const float value : volume.values) {
+    if (value < 0) return false;
+    if (value > 0) above.push_back(value);
+    highest = std::max(highest, value);
+  }
+  if (highest < kLeastOfBone) return false;
+  const double tissue = share(above, 850, 1250);
+  const bool is_bone_alone = share(above, 0, 500) < 0.02;
+  const bool is_patient = tissue > 0.2 && share(above, 300, 800) < 0.25 * tissue;
+  return is_bone_alone || is_patient;
+}
+
 }  // namespace
 
 Volume read_volume_file(const fs::path& path, const VolumeReading& reading,
@@ -113,6 +135,48 @@ Volume read_volume_file(const fs::path& path, const VolumeReading& reading,
     for (float& value : volume.values) value = float(value + reading.value_offset_hu);
   check_volume(volume, path.string());
   return volume;
+}
+
+void warn_of_offset(const Volume& volume, const std::filesystem::path& path, double value_offset_hu,
+                    const Context& context) {
+  if (value_offset_hu != 0 || !seems_to_have_offset(volume)) return;
+  context.warn(path.string() +
+               ": the CT seems to hold HU + 1024, not Hounsfield units: no value is below 0, and soft tissue and bone "
+               "lie about 1024 too high. If so, give value_offset_hu: -1024 (-1000 if 1000 was added); without it, "
+               "thresholds and simulated X-ray images are wrong");
+}
+
+Grid grid_of(const Samples& samples) {
+  Grid grid;
+  grid.size = samples.size;
+  grid.spacing_mm = Eigen::Map<const Eigen::Vector3d>(samples.spacing_mm.data());
+  grid.origin_mm = Eigen::Map<const Eigen::Vector3d>(samples.origin_mm.data());
+  grid.direction = Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(samples.direction.data());
+  const Eigen::Matrix3d defect = grid.direction.transpose() * grid.direction - Eigen::Matrix3d::Identity();
+  if (grid.direction.allFinite() && defect.cwiseAbs().maxCoeff() < kRoundedDirection &&
+      defect.cwiseAbs().maxCoeff() > 1e-12) {
+    grid.direction = nearest_orthogonal(grid.direction);
+  }
+  return grid;
+}
+
+void flip(Volume& volume, int axis) {
+  const auto [nx, ny, nz] = volume.grid.size;
+  const std::array<int, 3> half{axis == 0 ? nx / 2 : nx, axis == 1 ? ny / 2 : ny, axis == 2 ? nz / 2 : nz};
+  for (int z = 0; z < half[2]; ++z)
+    for (int y = 0; y < half[1]; ++y)
+      for (int x = 0; x < half[0]; ++x)
+        std::swap(volume.values[volume.grid.offset(x, y, z)],
+                  volume.values[volume.grid.offset(axis == 0 ? nx - 1 - x : x, axis == 1 ? ny - 1 - y : y,
+                                                   axis == 2 ? nz - 1 - z : z)]);
+}
+
+void make_right_handed(Volume& volume) {
+  Grid& grid = volume.grid;
+  if (!(grid.direction.determinant() < 0)) return;
+  flip(volume, 2);
+  grid.origin_mm += grid.direction.col(2) * (grid.spacing_mm[2] * (grid.size[2] - 1));
+  grid.direction.col(2) *= -1;
 }
 
 }  // namespace marrow::files

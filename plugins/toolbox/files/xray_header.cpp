@@ -7,8 +7,6 @@
 #include "dicom_pixels.hpp"
 #include "marrow/base/error.hpp"
 #include "marrow/base/number_text.hpp"
-#include "marrow/domain/c_arm.hpp"
-#include "patient_orientation.hpp"
 
 namespace marrow::files {
 namespace {

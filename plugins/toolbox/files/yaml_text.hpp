@@ -8,9 +8,6 @@
 
 #include "marrow/domain/camera.hpp"
 #include "marrow/domain/features.hpp"
-#include "marrow/domain/landmarks.hpp"
-#include "marrow/domain/list.hpp"
-#include "marrow/domain/pose.hpp"
 #include "marrow/domain/verdict.hpp"
 #include "marrow/domain/volume.hpp"
 

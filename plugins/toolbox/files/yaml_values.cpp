@@ -1,15 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "marrow/toolbox/files/yaml_values.hpp"
 
-#include <Eigen/Geometry>
 #include <Eigen/LU>
 #include <cmath>
 
-#include "marrow/base/error.hpp"
 #include "marrow/base/number_text.hpp"
-#include "marrow/domain/c_arm.hpp"
-#include "marrow/toolbox/files/distortion_file.hpp"
-#include "marrow/toolbox/files/stated_deviations.hpp"
 #include "marrow/toolbox/files/yaml_text.hpp"
 
 namespace marrow::files {
@@ -35,50 +30,6 @@ std::optional<FragmentFrame> frame_from(const YAML::Node& node, YamlFile& file) 
   }
   return FragmentFrame{*origin, *axes, map.boolean_or("anatomical", true)};
 }
-
-}  // namespace
-
-const std::vector<std::string>& transform_keys() {
-  static const std::vector<std::string> kKeys{"target", "source", "rotation", "translation_mm", "matrix"};
-  return kKeys;
-}
-
-std::optional<RigidTransform> transform_from(const YamlMap& map, const RigidTransform& expected) {
-  if (!map.valid()) return std::nullopt;
-  RigidTransform transform = expected;
-  check_frame(map, "target", expected.target);
-  if (!expected.source.empty())
-    check_frame(map, "source", expected.source);
-  else if (const auto source = map.text("source"))
-    transform.source = *source;
-  if (map.has("matrix")) {
-    for (const char* key : {"rotation", "translation_mm"})
-      if (map.has(key)) map.fault(key, std::string(key) + ": 'matrix' already gives it; keep one of the two");
-    const auto matrix = map.matrix("matrix", 4, 4);
-    if (!matrix) return std::nullopt;
-    if (matrix->row(3) != Eigen::RowVector4d(0, 0, 0, 1)) {
-      map.fault("matrix", "matrix: the last row of a rigid transform is [0, 0, 0, 1]");
-      return std::nullopt;
-    }
-    transform.rotation = matrix->topLeftCorner<3, 3>();
-    transform.translation_mm = matrix->topRightCorner<3, 1>();
-  } else {
-    const auto rotation = map.matrix("rotation", 3, 3);
-    const auto translation = map.vector3("translation_mm");
-    if (!rotation || !translation) return std::nullopt;
-    transform.rotation = *rotation;
-    transform.translation_mm = *translation;
-  }
-  try {
-    check_rigid(transform, map.has("matrix") ? "matrix" : "rotation");
-  } catch (const Error& error) {
-    map.fault(map.has("matrix") ? "matrix" : "rotation", error.what());
-    return std::nullopt;
-  }
-  return transform;
-}
-
-namespace {
 
 constexpr double kSquare = 5e-4;  // directions of few digits are at right angles to this
 
@@ -141,36 +92,6 @@ bool take_measured(const YamlMap& map, CameraInFile& camera) {
   return true;
 }
 
-}  // namespace
-
-std::optional<Detector> detector_from(const YamlMap& map, int width_px, int height_px) {
-  const bool has_corner = map.has("corner_mm");
-  if (has_corner && map.has("centre_mm"))
-    map.fault("centre_mm", "centre_mm: 'corner_mm' already says where the detector is; keep one of the two");
-  const auto source = map.vector3("source_mm"), place = map.vector3(has_corner ? "corner_mm" : "centre_mm"),
-             columns = map.vector3("columns"), rows = map.vector3("rows");
-  const auto pixel = map.numbers("pixel_mm", 2);
-  if (!source || !place || !columns || !rows || !pixel) return std::nullopt;
-  if (!(columns->norm() > 0 && rows->norm() > 0) || std::abs(columns->normalized().dot(rows->normalized())) > kSquare) {
-    map.fault("rows", "rows: expected a direction at a right angle to 'columns'");
-    return std::nullopt;
-  }
-  if (!((*pixel)[0] > 0 && (*pixel)[1] > 0)) {
-    map.fault("pixel_mm", "pixel_mm: expected the width and the height of a pixel, more than 0");
-    return std::nullopt;
-  }
-  Detector detector{*source, *place, columns->normalized(), rows->normalized(), {(*pixel)[0], (*pixel)[1]}};
-  if (!has_corner)
-    detector.corner_mm -=
-        0.5 * (width_px - 1) * (*pixel)[0] * detector.columns + 0.5 * (height_px - 1) * (*pixel)[1] * detector.rows;
-  const double away_mm = (detector.corner_mm - *source).dot(detector.columns.cross(detector.rows));
-  if (std::abs(away_mm) > 1) return detector;
-  map.fault("source_mm", "source_mm: the source lies in the detector's plane");
-  return std::nullopt;
-}
-
-namespace {
-
 /// The camera from a matrix of any scale and sign. Of the two signs, that one is taken with which the image is seen
 /// from the source, as marrow takes images. For an image that is seen from the detector, the object then lies behind
 /// the camera, which the nodes that use it say.
@@ -197,7 +118,132 @@ std::optional<Camera> camera_by_detector(const YamlMap& map, int width_px, int h
   return std::nullopt;
 }
 
+std::optional<Matrix6d> covariance_from(const YamlMap& map) {
+  const auto covariance = map.matrix("covariance", 6, 6);
+  if (!covariance) return std::nullopt;
+  try {
+    check_covariance(*covariance, "covariance");
+  } catch (const Error& error) {
+    map.fault("covariance", error.what());
+    return std::nullopt;
+  }
+  return Matrix6d(*covariance);
+}
+
+/// Pairs of evaluations and the least cost after them.
+std::vector<Pose::Progress> convergence_from(const YamlMap& map) {
+  std::vector<Pose::Progress> convergence;
+  const YAML::Node list = map.node("convergence");
+  if (!list.IsSequence()) {
+    map.fault("convergence", "convergence: expected a list, got " + yaml_described(list));
+    return convergence;
+  }
+  for (const YAML::Node& item : list) {
+    const bool is_pair = item.IsSequence() && item.size() == 2;
+    const std::optional<std::int64_t> evaluations = is_pair ? yaml_integer(item[0]) : std::nullopt;
+    const std::optional<double> cost = is_pair ? yaml_number(item[1]) : std::nullopt;
+    if (evaluations && cost && std::abs(*evaluations) <= 1'000'000'000)
+      convergence.push_back({int(*evaluations), *cost});
+    else
+      map.file().fault(item.Mark(),
+                       map.what() + ": convergence: expected a pair [evaluations, cost], got " + yaml_described(item));
+  }
+  return convergence;
+}
+
+/// A number, or what number() writes for one that is not finite.
+std::optional<double> any_number_from(const YamlMap& map, const std::string& key) {
+  const YAML::Node node = map.node(key);
+  const std::string text = node.IsDefined() && node.IsScalar() ? node.Scalar() : "";
+  for (const double value : {std::nan(""), HUGE_VAL, -HUGE_VAL})
+    if (text == number(value)) return value;
+  return map.number(key);
+}
+
+std::vector<Metric> figures_from(const YamlMap& map) {
+  std::vector<Metric> figures;
+  const YAML::Node list = map.node("figures");
+  if (!list.IsSequence()) {
+    map.fault("figures", "figures: expected a list, got " + yaml_described(list));
+    return figures;
+  }
+  for (const YAML::Node& item : list) {
+    const YamlMap figure(map.file(), item, "a figure", {"name", "value", "unit"});
+    const auto name = figure.text("name");
+    const auto value = any_number_from(figure, "value");
+    const auto unit = figure.has("unit") ? figure.text("unit") : "";
+    if (name && value && unit) figures.push_back({*name, *value, *unit});
+  }
+  return figures;
+}
+
 }  // namespace
+
+const std::vector<std::string>& transform_keys() {
+  static const std::vector<std::string> kKeys{"target", "source", "rotation", "translation_mm", "matrix"};
+  return kKeys;
+}
+
+std::optional<RigidTransform> transform_from(const YamlMap& map, const RigidTransform& expected) {
+  if (!map.valid()) return std::nullopt;
+  RigidTransform transform = expected;
+  check_frame(map, "target", expected.target);
+  if (!expected.source.empty())
+    check_frame(map, "source", expected.source);
+  else if (const auto source = map.text("source"))
+    transform.source = *source;
+  if (map.has("matrix")) {
+    for (const char* key : {"rotation", "translation_mm"})
+      if (map.has(key)) map.fault(key, std::string(key) + ": 'matrix' already gives it; keep one of the two");
+    const auto matrix = map.matrix("matrix", 4, 4);
+    if (!matrix) return std::nullopt;
+    if (matrix->row(3) != Eigen::RowVector4d(0, 0, 0, 1)) {
+      map.fault("matrix", "matrix: the last row of a rigid transform is [0, 0, 0, 1]");
+      return std::nullopt;
+    }
+    transform.rotation = matrix->topLeftCorner<3, 3>();
+    transform.translation_mm = matrix->topRightCorner<3, 1>();
+  } else {
+    const auto rotation = map.matrix("rotation", 3, 3);
+    const auto translation = map.vector3("translation_mm");
+    if (!rotation || !translation) return std::nullopt;
+    transform.rotation = *rotation;
+    transform.translation_mm = *translation;
+  }
+  try {
+    check_rigid(transform, map.has("matrix") ? "matrix" : "rotation");
+  } catch (const Error& error) {
+    map.fault(map.has("matrix") ? "matrix" : "rotation", error.what());
+    return std::nullopt;
+  }
+  return transform;
+}
+
+std::optional<Detector> detector_from(const YamlMap& map, int width_px, int height_px) {
+  const bool has_corner = map.has("corner_mm");
+  if (has_corner && map.has("centre_mm"))
+    map.fault("centre_mm", "centre_mm: 'corner_mm' already says where the detector is; keep one of the two");
+  const auto source = map.vector3("source_mm"), place = map.vector3(has_corner ? "corner_mm" : "centre_mm"),
+             columns = map.vector3("columns"), rows = map.vector3("rows");
+  const auto pixel = map.numbers("pixel_mm", 2);
+  if (!source || !place || !columns || !rows || !pixel) return std::nullopt;
+  if (!(columns->norm() > 0 && rows->norm() > 0) || std::abs(columns->normalized().dot(rows->normalized())) > kSquare) {
+    map.fault("rows", "rows: expected a direction at a right angle to 'columns'");
+    return std::nullopt;
+  }
+  if (!((*pixel)[0] > 0 && (*pixel)[1] > 0)) {
+    map.fault("pixel_mm", "pixel_mm: expected the width and the height of a pixel, more than 0");
+    return std::nullopt;
+  }
+  Detector detector{*source, *place, columns->normalized(), rows->normalized(), {(*pixel)[0], (*pixel)[1]}};
+  if (!has_corner)
+    detector.corner_mm -=
+        0.5 * (width_px - 1) * (*pixel)[0] * detector.columns + 0.5 * (height_px - 1) * (*pixel)[1] * detector.rows;
+  const double away_mm = (detector.corner_mm - *source).dot(detector.columns.cross(detector.rows));
+  if (std::abs(away_mm) > 1) return detector;
+  map.fault("source_mm", "source_mm: the source lies in the detector's plane");
+  return std::nullopt;
+}
 
 std::optional<CameraInFile> camera_from(const YAML::Node& node, YamlFile& file) {
   const YamlMap map(file, node, "camera",
@@ -251,43 +297,6 @@ void check_version(const YamlMap& map, const std::string& key) {
     map.fault(key, formatted("{}: this program reads version 1, the file is of version {}", key, *version));
 }
 
-namespace {
-
-std::optional<Matrix6d> covariance_from(const YamlMap& map) {
-  const auto covariance = map.matrix("covariance", 6, 6);
-  if (!covariance) return std::nullopt;
-  try {
-    check_covariance(*covariance, "covariance");
-  } catch (const Error& error) {
-    map.fault("covariance", error.what());
-    return std::nullopt;
-  }
-  return Matrix6d(*covariance);
-}
-
-/// Pairs of evaluations and the least cost after them.
-std::vector<Pose::Progress> convergence_from(const YamlMap& map) {
-  std::vector<Pose::Progress> convergence;
-  const YAML::Node list = map.node("convergence");
-  if (!list.IsSequence()) {
-    map.fault("convergence", "convergence: expected a list, got " + yaml_described(list));
-    return convergence;
-  }
-  for (const YAML::Node& item : list) {
-    const bool is_pair = item.IsSequence() && item.size() == 2;
-    const std::optional<std::int64_t> evaluations = is_pair ? yaml_integer(item[0]) : std::nullopt;
-    const std::optional<double> cost = is_pair ? yaml_number(item[1]) : std::nullopt;
-    if (evaluations && cost && std::abs(*evaluations) <= 1'000'000'000)
-      convergence.push_back({int(*evaluations), *cost});
-    else
-      map.file().fault(item.Mark(),
-                       map.what() + ": convergence: expected a pair [evaluations, cost], got " + yaml_described(item));
-  }
-  return convergence;
-}
-
-}  // namespace
-
 Pose read_pose_file(const std::filesystem::path& path) {
   YamlFile file(path);
   std::vector<std::string> keys = transform_keys();
@@ -313,36 +322,6 @@ Pose read_pose_file(const std::filesystem::path& path) {
   file.finish();
   return pose;
 }
-
-namespace {
-
-/// A number, or what number() writes for one that is not finite.
-std::optional<double> any_number_from(const YamlMap& map, const std::string& key) {
-  const YAML::Node node = map.node(key);
-  const std::string text = node.IsDefined() && node.IsScalar() ? node.Scalar() : "";
-  for (const double value : {std::nan(""), HUGE_VAL, -HUGE_VAL})
-    if (text == number(value)) return value;
-  return map.number(key);
-}
-
-std::vector<Metric> figures_from(const YamlMap& map) {
-  std::vector<Metric> figures;
-  const YAML::Node list = map.node("figures");
-  if (!list.IsSequence()) {
-    map.fault("figures", "figures: expected a list, got " + yaml_described(list));
-    return figures;
-  }
-  for (const YAML::Node& item : list) {
-    const YamlMap figure(map.file(), item, "a figure", {"name", "value", "unit"});
-    const auto name = figure.text("name");
-    const auto value = any_number_from(figure, "value");
-    const auto unit = figure.has("unit") ? figure.text("unit") : "";
-    if (name && value && unit) figures.push_back({*name, *value, *unit});
-  }
-  return figures;
-}
-
-}  // namespace
 
 Verdict read_verdict_file(const std::filesystem::path& path) {
   YamlFile file(path);

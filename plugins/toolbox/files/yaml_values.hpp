@@ -1,15 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 // Reads values that marrow keeps in YAML files: transforms, poses, cameras and seeds (docs/case.md).
-#include "marrow/domain/calibration.hpp"
-#include "marrow/domain/camera.hpp"
-#include "marrow/domain/list.hpp"
-#include "marrow/domain/pose.hpp"
 #include "marrow/domain/verdict.hpp"
 #include "marrow/domain/volume.hpp"
 #include "marrow/toolbox/files/camera_file.hpp"
-#include "marrow/toolbox/files/projection_camera.hpp"
-#include "marrow/toolbox/files/strict_yaml.hpp"
 
 namespace marrow::files {
 

@@ -1,11 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "marrow/toolbox/geometry/camera_deviations.hpp"
 
-#include <Eigen/Geometry>
 #include <cmath>
-
-#include "marrow/base/error.hpp"
-#include "marrow/domain/transform.hpp"
 
 namespace marrow::geometry {
 

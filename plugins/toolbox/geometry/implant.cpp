@@ -4,7 +4,6 @@
 #include <cmath>
 #include <set>
 
-#include "marrow/base/error.hpp"
 #include "marrow/base/number_text.hpp"
 
 namespace marrow::geometry {

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 // The common part of measures that compare a pose with the truth: whether the two can be compared, and at which points.
-#include <marrow/domain/landmarks.hpp>
-#include <marrow/domain/mesh.hpp>
+#include <marrow/domain/features.hpp>
 #include <marrow/domain/pose.hpp>
 #include <vector>
 

@@ -1,13 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "marrow/toolbox/match/inputs.hpp"
 
-#include <algorithm>
-#include <cmath>
-#include <functional>
-
-#include "marrow/base/error.hpp"
-#include "marrow/base/number_text.hpp"
-#include "marrow/toolbox/match/nearest_outline.hpp"
+#include "marrow/toolbox/match/nearest_edges.hpp"
 
 namespace marrow::match {
 namespace {

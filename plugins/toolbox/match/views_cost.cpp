@@ -3,7 +3,6 @@
 
 #include <tbb/parallel_for.h>
 
-#include <algorithm>
 #include <numeric>
 
 namespace marrow::match {

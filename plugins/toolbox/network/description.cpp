@@ -3,14 +3,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <marrow/base/error.hpp>
 #include <optional>
 #include <set>
 #include <utility>
 
 #include "marrow/base/names.hpp"
 #include "marrow/base/number_text.hpp"
-#include "marrow/toolbox/files/strict_yaml.hpp"
 #include "marrow/toolbox/files/yaml_values.hpp"
 
 namespace marrow::network {

@@ -3,20 +3,50 @@
 
 #include <tbb/enumerable_thread_specific.h>
 #include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <cmath>
-#include <marrow/base/error.hpp>
 #include <opencv2/core/utils/logger.hpp>
+#include <opencv2/core/version.hpp>
 #include <opencv2/dnn.hpp>
 #include <opencv2/imgproc.hpp>
+#include <regex>
 
 #include "marrow/base/names.hpp"
 #include "marrow/base/number_text.hpp"
-#include "marrow/toolbox/network/model_file.hpp"
+#include "marrow/base/printable.hpp"
+#include "marrow/toolbox/files/input_file.hpp"
 
 namespace marrow::network {
 namespace {
+
+constexpr std::uint64_t kMostBytes = 512'000'000;
+constexpr std::size_t kLongest = 300;
+
+/// The bytes of a model. Throws Error if it cannot be read, is empty, or has more than 512 MB.
+std::string model_file(const std::filesystem::path& file) {
+  now_reading(file);
+  return files::read_bytes(file, kMostBytes);
+}
+
+/// What OpenCV's message about a model means: which layer it does not know, or that the file is damaged, and what to
+/// do.
+std::string reason_of_model(const std::string& message) {
+  std::smatch found;
+  static const std::regex node("Node \\[([^@\\]]*)@[^\\]]*\\]:\\(([^)]*)\\)");
+  if (std::regex_search(message, found, node)) {
+    std::string name = found[2];
+    name = name.substr(name.find('!') == std::string::npos ? 0 : name.find('!') + 1);
+    return "OpenCV " CV_VERSION " cannot compute its layer '" + printable(name) + "' of the type " +
+           printable(found[1].str()) +
+           "; export the network with other layers (Conv, ConvTranspose, BatchNormalization, Relu, MaxPool, Concat, "
+           "Add, Sigmoid), with opset_version=11 and for a tile of fixed size";
+  }
+  static const std::regex damaged("parse onnx model|has_graph", std::regex::icase);
+  if (std::regex_search(message, damaged)) return "is no ONNX model, or a damaged one; export it again";
+  // The place in OpenCV's source says nothing here.
+  static const std::regex frame("OpenCV\\([0-9.]+\\) \\S+ error: |\\s+$");
+  return "OpenCV says: " + printable(cut(std::regex_replace(message, frame, ""), kLongest));
+}
 
 /// Where tiles begin along one axis, in pixels of the image; the first begin before it.
 std::vector<int> tile_starts(int length, int tile, int overlap) {

@@ -2,12 +2,11 @@
 // From a view to the network's pixels and back.
 #include <algorithm>
 #include <cmath>
-#include <marrow/base/error.hpp>
 #include <marrow/domain/quantile.hpp>
 #include <opencv2/imgproc.hpp>
 
 #include "marrow/base/number_text.hpp"
-#include "marrow/toolbox/image/line_integrals.hpp"
+#include "marrow/toolbox/image/grey_values.hpp"
 #include "marrow/toolbox/network/inference.hpp"
 
 namespace marrow::network {

@@ -5,7 +5,6 @@
 #include <cstdint>
 #include <vector>
 
-#include "marrow/domain/calibration.hpp"
 #include "marrow/toolbox/calibration/board.hpp"
 
 namespace marrow::phantom {

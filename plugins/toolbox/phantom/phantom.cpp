@@ -1,18 +1,29 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "marrow/toolbox/phantom/phantom.hpp"
 
-#include <algorithm>
 #include <cmath>
 
-#include "marrow/base/error.hpp"
 #include "marrow/base/number_text.hpp"
-#include "marrow/toolbox/phantom/materials.hpp"
 
 namespace marrow::phantom {
 namespace {
 
 void shift(Mesh& mesh, const Eigen::Vector3d& by_mm) {
   for (auto& vertex : mesh.vertices_mm) vertex += by_mm;
+}
+
+Spectrum mixed(double first_share, const Spectrum& first, const Spectrum& second) {
+  Spectrum result;
+  for (std::size_t e = 0; e < result.size(); ++e) result[e] = first_share * first[e] + (1 - first_share) * second[e];
+  return result;
+}
+
+using Eigen::Vector3d;
+
+/// The direction of a curve at one of its points.
+Vector3d direction_at(const Points& curve, std::size_t i) {
+  const std::size_t before = i > 0 ? i - 1 : 0, after = std::min(i + 1, curve.size() - 1);
+  return (curve[after] - curve[before]).normalized();
 }
 
 }  // namespace
@@ -132,6 +143,92 @@ double Fill::mean(double from, double to) const {
   // Below a micrometre the quotient loses its precision, but the fraction hardly changes.
   if (std::abs(to - from) < 1e-3) return at(0.5 * (from + to));
   return (integral(to) - integral(from)) / (to - from);
+}
+
+const std::vector<Material>& materials() {
+  // Metals, plastic and carbon: mass attenuation coefficients at 40, 50, 60 and 80 keV (Hubbell and Seltzer, NIST IR
+  // 5632), at 70 keV along a power law between 60 and 80 keV, times the density.
+  static const std::vector<Material> all{
+      {"fat", kFatPerMm, -100},
+      {"muscle", kMusclePerMm, 50},
+      {"blood", mixed(0.02, kBonePerMm, kMusclePerMm), 60},
+      {"cortical bone", kBonePerMm, 1450},
+      {"cancellous bone", mixed(0.22, kBonePerMm, kMarrowPerMm), 0.22 * 1450 - 0.78 * 20},
+      {"calcified wall", mixed(0.5, kBonePerMm, kMusclePerMm), 750},
+      {"titanium", {0.9985, 0.5471, 0.3455, 0.2456}, kLargestHu, true},  // 4.51 g/cm3
+      {"steel", {2.867, 1.547, 0.952, 0.652}, kLargestHu, true},         // as iron, 7.9 g/cm3
+      {"copper", {4.356, 2.341, 1.427, 0.962}, kLargestHu, true},        // 8.96 g/cm3
+      {"plastic", {0.02797, 0.02468, 0.02290, 0.02177}, 120},            // acrylic, 1.19 g/cm3
+      {"carbon", {0.03322, 0.02994, 0.02805, 0.02680}, 400},             // laminate of carbon fibre, 1.6 g/cm3
+  };
+  return all;
+}
+
+const Material& material(const std::string& name) {
+  for (const Material& one : materials())
+    if (one.name == name) return one;
+  std::string known;
+  for (const Material& one : materials()) known += (known.empty() ? "" : ", ") + std::string(one.name);
+  throw Error("there is no material '" + name + "'; there are: " + known);
+}
+
+Mesh loft(const std::vector<Points>& rings) {
+  Mesh mesh;
+  mesh.frame = "world";
+  const std::uint32_t sides = std::uint32_t(rings.front().size()), count = std::uint32_t(rings.size());
+  Vector3d first = Vector3d::Zero(), last = first;
+  for (const Points& ring : rings) mesh.vertices_mm.insert(mesh.vertices_mm.end(), ring.begin(), ring.end());
+  for (std::uint32_t k = 0; k < sides; ++k) {
+    first += rings.front()[k] / sides;
+    last += rings.back()[k] / sides;
+  }
+  mesh.vertices_mm.push_back(first);
+  mesh.vertices_mm.push_back(last);
+  const std::uint32_t at_first = sides * count, at_last = at_first + 1, end = sides * (count - 1);
+  for (std::uint32_t k = 0; k < sides; ++k) {
+    const std::uint32_t next = (k + 1) % sides;
+    for (std::uint32_t ring = 0; ring + 1 < count; ++ring) {
+      const std::uint32_t below = ring * sides, above = below + sides;
+      mesh.triangles.push_back({below + k, below + next, above + next});
+      mesh.triangles.push_back({below + k, above + next, above + k});
+    }
+    mesh.triangles.push_back({at_first, next, k});
+    mesh.triangles.push_back({at_last, end + k, end + next});
+  }
+  return mesh;
+}
+
+Mesh tube(const Points& curve, const std::vector<double>& radii, int sides) {
+  Vector3d across = direction_at(curve, 0).unitOrthogonal();
+  std::vector<Points> rings;
+  for (std::size_t i = 0; i < curve.size(); ++i) {
+    const Vector3d along = direction_at(curve, i);
+    across = (across - along * along.dot(across)).normalized();  // turned with the curve, without twist
+    const Vector3d third = along.cross(across);
+    Points& ring = rings.emplace_back();
+    for (int k = 0; k < sides; ++k) {
+      const double angle = 2 * kPi * k / sides;
+      ring.push_back(curve[i] + radii[i] * (std::cos(angle) * across + std::sin(angle) * third));
+    }
+  }
+  return loft(rings);
+}
+
+Mesh tube(const Vector3d& from, const Vector3d& to, double radius, int sides) {
+  return tube({from, to}, {radius, radius}, sides);
+}
+
+Mesh bar(const Points& curve, const Vector3d& up, double width, double thickness) {
+  std::vector<Points> rings;
+  for (std::size_t i = 0; i < curve.size(); ++i) {
+    const Vector3d along = direction_at(curve, i), across = along.cross(up).normalized(),
+                   flat = across.cross(along).normalized();
+    // Flat, across and along are right-handed.
+    Points& ring = rings.emplace_back();
+    for (const auto& [f, a] : {std::pair(-0.5, -0.5), std::pair(0.5, -0.5), std::pair(0.5, 0.5), std::pair(-0.5, 0.5)})
+      ring.push_back(curve[i] + f * thickness * flat + a * width * across);
+  }
+  return loft(rings);
 }
 
 }  // namespace marrow::phantom

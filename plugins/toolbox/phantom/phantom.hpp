@@ -3,13 +3,12 @@
 // Values that the simulation nodes exchange: a bone as closed surfaces, the fragments that a fracture makes of it, and
 // what else is in the beam.
 #include <Eigen/Core>
+#include <array>
 #include <string>
+#include <string_view>
 #include <vector>
 
-#include "marrow/base/fields.hpp"
-#include "marrow/domain/mesh.hpp"
-#include "marrow/domain/transform.hpp"
-#include "marrow/domain/volume.hpp"
+#include "marrow/domain/case.hpp"
 #include "marrow/runtime/node/value.hpp"
 
 namespace marrow::phantom {
@@ -112,8 +111,56 @@ class Fill {
   std::vector<double> z_, fraction_, integral_;
 };
 
+/// The energies at which attenuation is given: 40, 50, 60, 70 keV.
+using Spectrum = std::array<double, 4>;
+
+/// Linear attenuation of tissue per mm (ICRP 110 materials of the MC-GPU tables).
+constexpr Spectrum kBonePerMm{0.1235, 0.07937, 0.05934, 0.04871};
+constexpr Spectrum kMarrowPerMm{0.02649, 0.02277, 0.02082, 0.01959};
+constexpr Spectrum kMusclePerMm{0.02840, 0.02390, 0.02161, 0.02020};
+constexpr Spectrum kFatPerMm{0.02299, 0.02032, 0.01886, 0.01789};
+
+struct Material {
+  std::string_view name;
+  Spectrum per_mm;
+  double hu;  ///< in a CT; metal is far beyond the largest value of a scanner and is cut to it
+  bool is_metal = false;
+};
+
+/// The largest value of a CT of 12 bits.
+constexpr double kLargestHu = 3071;
+
+const std::vector<Material>& materials();
+/// Throws Error if there is no material of this name.
+const Material& material(const std::string& name);
+
+using Points = std::vector<Eigen::Vector3d>;
+
+/// A closed surface through rings of points, all of the same number. Each ring runs counter-clockwise if seen from the
+/// next one. Both ends are closed by fans around their middle.
+Mesh loft(const std::vector<Points>& rings);
+
+/// A tube along a curve, with one radius for each of its points. The corners lie on the radius.
+Mesh tube(const Points& curve_mm, const std::vector<double>& radii_mm, int sides = 48);
+Mesh tube(const Eigen::Vector3d& from_mm, const Eigen::Vector3d& to_mm, double radius_mm, int sides = 48);
+
+/// A bar of rectangular section along a curve. Its flat side points to `up`, which must not be parallel to the curve.
+/// `width_mm` is measured across `up` and the curve.
+Mesh bar(const Points& curve_mm, const Eigen::Vector3d& up, double width_mm, double thickness_mm);
+
+/// A case as it is to be written, with the way in which it gives its fragments. `labels` and `surfaces` are empty for
+/// seeds.
+struct CaseFolder {
+  Case parts;
+  Volume labels;        ///< 1 in the first fragment of Case::seeds, 2 in the second and so on; 0 outside
+  List<Mesh> surfaces;  ///< of each fragment of Case::seeds; then there is no CT
+  using fields = Fields<&CaseFolder::parts, &CaseFolder::labels, &CaseFolder::surfaces>;
+};
+
 }  // namespace marrow::phantom
 
 MARROW_VALUE_TYPE(marrow::phantom::Bone, "simulated_bone", 1)
 MARROW_VALUE_TYPE(marrow::phantom::Phantom, "phantom", 2)
 MARROW_VALUE_TYPE(marrow::phantom::ClutteredPhantom, "cluttered_phantom", 1)
+
+MARROW_VALUE_TYPE(marrow::phantom::CaseFolder, "case_folder", 1)

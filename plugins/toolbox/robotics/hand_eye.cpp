@@ -1,14 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "marrow/toolbox/robotics/hand_eye.hpp"
 
-#include <Eigen/Geometry>
 #include <Eigen/LU>
-#include <algorithm>
-#include <array>
 #include <cmath>
 
 #include "least_squares.hpp"
-#include "marrow/base/error.hpp"
 #include "marrow/base/number_text.hpp"
 #include "marrow/domain/decompositions.hpp"
 
@@ -154,11 +150,11 @@ HandEye solve_ax_xb(const std::vector<Move>& moves) {
     by_turn.middleRows<3>(row) = -cross_matrix(x.rotation * moves[i].seen.translation_mm);
   }
   const Eigen::Matrix3d of_turn = variance_of(squares, double(rows - 3), kLeastNoise_rad) *
-                                  with_a_little(information, information.trace()).inverse();
+                                  inverse_of(with_a_little(information, information.trace()));
   check_turned(of_turn, "the motions of the hand-eye transform");
   x.translation_mm = least(matrix, right);
   // A turn of X about the base's axes moves the least squares' solution by `lever`.
-  const Eigen::Matrix3d inverse = with_a_little(matrix.transpose() * matrix, matrix.squaredNorm()).inverse(),
+  const Eigen::Matrix3d inverse = inverse_of(with_a_little(matrix.transpose() * matrix, matrix.squaredNorm())),
                         lever = inverse * matrix.transpose() * by_turn;
   const double of_shift =
       variance_of((matrix * x.translation_mm - right).squaredNorm(), double(rows - 3), kLeastNoise_mm);
@@ -213,7 +209,7 @@ RobotWorld refined(const RobotWorld& start, const std::vector<Station>& stations
   const Eigen::MatrixXd hessian = least_from(found, radians(1), 1, 1).hessian,
                         scatter = least_from(found, radians(1) / rotation_deg, 1 / shift_mm, 1).hessian;
   const double most = hessian.trace();
-  const Eigen::MatrixXd gain = with_a_little(hessian, most).inverse().bottomRows<6>();
+  const Eigen::MatrixXd gain = inverse_of(with_a_little(hessian, most)).bottomRows<6>();
   found.covariance = gain * with_a_little(scatter, most) * gain.transpose();
   return found;
 }

@@ -4,7 +4,6 @@
 #include <optional>
 #include <vector>
 
-#include "marrow/domain/mesh.hpp"
 #include "marrow/domain/pose.hpp"
 #include "marrow/runtime/node/value.hpp"
 

@@ -2,12 +2,7 @@
 #include "marrow/toolbox/robotics/hexapod.hpp"
 
 #include <Eigen/LU>
-#include <algorithm>
-#include <cmath>
-#include <limits>
 
-#include "marrow/base/error.hpp"
-#include "marrow/base/number_text.hpp"
 #include "marrow/domain/decompositions.hpp"
 #include "marrow/domain/random.hpp"
 
@@ -46,6 +41,23 @@ Matrix6d slopes_per_mm(const Hexapod& hexapod, const RigidTransform& base_from_p
 
 std::string condition_in_words(double value) {
   return std::isfinite(value) ? formatted("the condition of its legs is {:.0f}", value) : "the pose is singular";
+}
+
+/// Throws Error unless the legs hold the platform, also on the way from home. The message begins with `begin`.
+void check_held(const Hexapod& hexapod, const RigidTransform& base_from_platform, const std::string& begin) {
+  const double value = condition(hexapod, base_from_platform);
+  if (!(value <= kMostCondition))
+    throw Error(
+        formatted("{}the hexapod's legs do not hold the platform in this pose: {}, at most {:.0f} is allowed; give "
+                  "another motion, or another shape of the hexapod",
+                  begin, condition_in_words(value), kMostCondition));
+  // The determinant changes its sign at a singular pose.
+  if (slopes_per_mm(hexapod, base_from_platform).determinant() *
+          slopes_per_mm(hexapod, hexapod.base_from_home).determinant() <
+      0)
+    throw Error(begin +
+                "the hexapod cannot come from home to this pose: on the way its legs pass a singular pose, where "
+                "they do not hold the platform; give a smaller motion");
 }
 
 }  // namespace
@@ -110,27 +122,6 @@ std::string doubtful_condition(double worst, const std::string& what) {
                     "{:.0f} an error of a leg moves the platform several times as far as usual",
                     worst, kDoubtfulCondition);
 }
-
-namespace {
-
-/// Throws Error unless the legs hold the platform, also on the way from home. The message begins with `begin`.
-void check_held(const Hexapod& hexapod, const RigidTransform& base_from_platform, const std::string& begin) {
-  const double value = condition(hexapod, base_from_platform);
-  if (!(value <= kMostCondition))
-    throw Error(
-        formatted("{}the hexapod's legs do not hold the platform in this pose: {}, at most {:.0f} is allowed; give "
-                  "another motion, or another shape of the hexapod",
-                  begin, condition_in_words(value), kMostCondition));
-  // The determinant changes its sign at a singular pose.
-  if (slopes_per_mm(hexapod, base_from_platform).determinant() *
-          slopes_per_mm(hexapod, hexapod.base_from_home).determinant() <
-      0)
-    throw Error(begin +
-                "the hexapod cannot come from home to this pose: on the way its legs pass a singular pose, where "
-                "they do not hold the platform; give a smaller motion");
-}
-
-}  // namespace
 
 void check_workspace(const Hexapod& hexapod, const HexapodLimits& limits, const RigidTransform& base_from_platform,
                      const std::string& what) {

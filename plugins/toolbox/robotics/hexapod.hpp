@@ -2,10 +2,8 @@
 #pragma once
 // Kinematics of a hexapod (Stewart platform): six legs between joints of a base and joints of a platform.
 #include <array>
+#include <marrow/plugin.hpp>
 #include <string>
-
-#include "marrow/base/fields.hpp"
-#include "marrow/domain/transform.hpp"
 
 namespace marrow::robot {
 
@@ -76,5 +74,22 @@ struct PlatformPose {
 /// Dietmaier 1998. The start decides.) The lengths then agree to 1e-9 mm. Throws Error if there is no such pose near
 /// the start, or if the legs do not hold the platform there (kMostCondition).
 PlatformPose pose_of_legs(const Hexapod& hexapod, const Vector6d& lengths_mm, const RigidTransform& start);
+
+/// For nodes that simulate a hexapod: declares the members of HexapodShape and HexapodLimits, from which `Options` is
+/// derived.
+template <class Options, class Node>
+Node& declare_hexapod(Node& node) {
+  return node
+      .option("base_radius_mm", &Options::base_radius_mm, "radius of the circle of the base's joints", at_least(1))
+      .option("platform_radius_mm", &Options::platform_radius_mm, "the same for the platform", at_least(1))
+      .option("base_gap_deg", &Options::base_gap_deg, "angle between the two joints of a pair of the base", at_least(0),
+              at_most(119))
+      .option("platform_gap_deg", &Options::platform_gap_deg, "the same for the platform", at_least(0), at_most(119))
+      .option("height_mm", &Options::height_mm, "height of the platform's joints above the base's at home", at_least(1))
+      .option("stroke_mm", &Options::stroke_mm, "how far a leg's length may differ from that at home, to either side",
+              at_least(0))
+      .option("joint_deg", &Options::joint_deg, "how far a leg may turn in its joints from its direction at home",
+              at_least(0), at_most(90));
+}
 
 }  // namespace marrow::robot

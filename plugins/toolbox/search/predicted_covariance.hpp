@@ -30,7 +30,7 @@ RigidTransform moved_by_units(const RigidTransform& pose, const FragmentFrame& f
 ///
 /// If only one or two blocks say anything, or the cost hardly changes along any axis, nothing is known: all deviations
 /// are huge. No deviation is 0: if no block moves the minimum, all are the least step. The cost must have compared
-/// something at the pose (compared.hpp).
+/// something at the pose (nothing_compared()).
 class PredictedCovariance {
  public:
   /// `coarser` is the same cost at a coarser level, if it is much cheaper there: where it says that the cost is far

@@ -1,8 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 // Search for the pose of least cost, from coarse to fine. Several nodes use it.
+#include <Eigen/Geometry>
 #include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
 #include <memory>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -107,8 +112,8 @@ Pose pose_of(const Search& search, const Pose& initial, const Cost& cost);
 /// out blocks, also with the predicted covariance and with warnings about axes that the images hardly determine. Along
 /// the direction that they determine least, the cost may have several minima, and the start decides in which the search
 /// ends. So the others are refined with `steps`, and the search goes to the best of them. Throws Error if the images
-/// say nothing about the pose (compared.hpp); a view that says nothing, where others do, is a warning. `coarser`, the
-/// same cost of grey values at a coarser level, saves time: PredictedCovariance says how.
+/// say nothing about the pose (nothing_compared()); a view that says nothing, where others do, is a warning. `coarser`,
+/// the same cost of grey values at a coarser level, saves time: PredictedCovariance says how.
 Pose final_pose_of(Search& search, const Pose& initial, const Cost& cost, const Steps& steps,
                    const SearchOptions& options, Context& context, const Cost* coarser = nullptr);
 
@@ -169,5 +174,99 @@ Node& declare(Node& node) {
       .option("warn_above_mm", &Options::warn_above_mm,
               "predicted standard deviation of a translation that gives a warning", marrow::at_least(0));
 }
+
+/// Right Jacobian J of a rotation vector: R(r + dr) = R(r) R(J dr) for small dr.
+inline Eigen::Matrix3d rotation_derivative(const Eigen::Vector3d& r_rad) {
+  const double angle = r_rad.norm();
+  const Eigen::Matrix3d cross = cross_matrix(r_rad);
+  if (angle < 1e-6) return Eigen::Matrix3d::Identity() - 0.5 * cross;
+  return Eigen::Matrix3d::Identity() - (1 - std::cos(angle)) / (angle * angle) * cross +
+         (angle - std::sin(angle)) / (angle * angle * angle) * cross * cross;
+}
+
+/// A cost's expansion about a pose that was moved by `deg_and_mm`, as a function of this motion's coordinates: degrees
+/// and mm along `axes`. If the cost has no expansion there, the value is NaN.
+inline MinimisationProblem::Expansion in_coordinates(const std::optional<Cost::Expansion>& about,
+                                                     const Vector6d& deg_and_mm, const std::vector<int>& axes) {
+  if (!about) return {std::numeric_limits<double>::quiet_NaN(), {}, {}};
+  const Eigen::Vector3d r_rad = deg_and_mm.head<3>() * radians(1);
+  Matrix6d motion_by_coordinates = Matrix6d::Zero();
+  motion_by_coordinates.topLeftCorner<3, 3>() = rotation_derivative(r_rad) * radians(1);
+  motion_by_coordinates.bottomRightCorner<3, 3>() = rotation_from_vector(r_rad).transpose();
+  const Eigen::Matrix<double, 6, Eigen::Dynamic> chosen = motion_by_coordinates(Eigen::all, axes);
+  return {about->value, chosen.transpose() * about->gradient, chosen.transpose() * about->curvature * chosen};
+}
+
+constexpr int kAxialRotation = 2, kAxialTranslation = 5;
+
+/// Motions of the start that are tried first, in degrees and mm, and the reach within which two of them are neighbours.
+struct Scan {
+  std::vector<Vector6d> motions;
+  Vector6d reach;  ///< half the sides of a box for a grid, else the half-axes of an ellipsoid
+  bool grid = true;
+
+  bool near(int a, int b) const {
+    const Vector6d way = (motions[std::size_t(a)] - motions[std::size_t(b)]).cwiseQuotient(reach);
+    return (grid ? way.cwiseAbs().maxCoeff() : way.norm()) <= 1;
+  }
+};
+
+/// A grid of axial rotations and translations, because the first stage does not determine them.
+inline Scan axial_scan(const SearchOptions& options) {
+  const auto steps = [](double range, double step) { return int(std::floor(range / step + 1e-9)); };
+  const int turns = steps(options.scan_rotation_deg, options.scan_rotation_step_deg);
+  const int shifts = steps(options.scan_translation_mm, options.scan_translation_step_mm);
+  Scan scan;
+  for (int turn = -turns; turn <= turns; ++turn)
+    for (int shift = -shifts; shift <= shifts; ++shift) {
+      Vector6d motion = Vector6d::Zero();
+      motion[kAxialRotation] = turn * options.scan_rotation_step_deg;
+      motion[kAxialTranslation] = shift * options.scan_translation_step_mm;
+      scan.motions.push_back(motion);
+    }
+  scan.reach = Vector6d::Ones();
+  scan.reach[kAxialRotation] = 2.01 * options.scan_rotation_step_deg;
+  scan.reach[kAxialTranslation] = 2.01 * options.scan_translation_step_mm;
+  return scan;
+}
+
+/// The start itself, and motions in all six axes spread evenly over their ranges (Halton's sequence). For a start that
+/// is only approximate in all six axes.
+inline Scan scattered_scan(const SearchOptions& options) {
+  Vector6d range;
+  range << options.scan_side_deg, options.scan_side_deg, options.scan_rotation_deg, options.scan_side_mm,
+      options.scan_side_mm, options.scan_translation_mm;
+  const auto halton = [](int i, int base) {
+    double value = 0, place = 1;
+    for (; i > 0; i /= base) value += (place /= base) * (i % base);
+    return value;
+  };
+  Scan scan;
+  for (int i = 0; i < options.scan_poses; ++i) {
+    Vector6d motion = Vector6d::Zero();
+    constexpr std::array<int, 6> kBases{2, 3, 5, 7, 11, 13};
+    for (int axis = 0; i > 0 && axis < 6; ++axis)
+      motion[axis] = range[axis] * (2 * halton(i, kBases[std::size_t(axis)]) - 1);
+    scan.motions.push_back(motion);
+  }
+  scan.reach = options.scan_reach * range.cwiseMax(1e-9);
+  scan.grid = false;
+  return scan;
+}
+
+/// A cost that has compared nothing is the same at all poses around. Any of them would pass for its minimum, with a
+/// deviation of 0. Why the images say nothing about a pose: what the cost itself says, or that it is not a number
+/// there, or the same at all poses 0.5 to 16 degrees and mm away along the axes of `frame`. Empty if they say
+/// something.
+std::string nothing_compared(const Cost& cost, const RigidTransform& pose, const FragmentFrame& frame);
+/// Throws Error if the images say nothing about a pose that was found.
+void check_compared(const Cost& cost, const RigidTransform& pose, const FragmentFrame& frame);
+/// The error for this reason.
+[[noreturn]] void refuse_pose(const std::string& why_nothing_is_compared,
+                              const std::string& which = "the pose that was found");
+
+/// Adds a warning for each view that says nothing about the pose, to the pose and to the log, unless the pose already
+/// has it.
+void warn_of_silent_views(const Cost& cost, Pose& pose, const Context& context);
 
 }  // namespace marrow::search

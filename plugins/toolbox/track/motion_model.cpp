@@ -2,11 +2,8 @@
 #include "marrow/toolbox/track/motion_model.hpp"
 
 #include <Eigen/Cholesky>
-#include <array>
 #include <cmath>
 
-#include "marrow/base/error.hpp"
-#include "marrow/base/number_text.hpp"
 #include "marrow/domain/decompositions.hpp"
 
 namespace marrow::track {

@@ -1,13 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "marrow/toolbox/track/tra_file.hpp"
 
-#include <algorithm>
-#include <array>
 #include <cmath>
 #include <sstream>
 
-#include "marrow/base/error.hpp"
-#include "marrow/base/number_text.hpp"
 #include "marrow/domain/decompositions.hpp"
 #include "marrow/toolbox/files/input_file.hpp"
 
@@ -71,6 +67,8 @@ std::optional<RigidTransform> pose_of(const std::array<double, 16>& m, const Lin
   return pose;
 }
 
+constexpr const char* kFrame = "autoscoper";
+
 }  // namespace
 
 AutoscoperTrack read_tra_file(const std::filesystem::path& path) {
@@ -102,6 +100,27 @@ std::string tra_text(const AutoscoperTrack& track) {
     text += "\n";
   }
   return text;
+}
+
+RigidTransform autoscoper_from_volume(const Grid& grid) {
+  const Eigen::Vector3d half = grid.spacing_mm / 2;
+  const Eigen::Vector3d first_mm(half.x(), grid.size[1] * grid.spacing_mm.y() - half.y(), -half.z());
+  RigidTransform transform{kFrame, grid.frame};
+  transform.rotation = Eigen::Vector3d(1, -1, -1).asDiagonal() * grid.direction.transpose();
+  transform.translation_mm = first_mm - transform.rotation * grid.origin_mm;
+  return transform;
+}
+
+RigidTransform world_from_volume(const RigidTransform& world_from_autoscoper, const Grid& grid) {
+  RigidTransform pose = world_from_autoscoper;
+  pose.source = kFrame;
+  return pose * autoscoper_from_volume(grid);
+}
+
+RigidTransform world_from_autoscoper(const RigidTransform& world_from_volume, const Grid& grid) {
+  RigidTransform pose = world_from_volume * inverse(autoscoper_from_volume(grid));
+  pose.source = world_from_volume.source;  // a file of poses names no frames
+  return pose;
 }
 
 }  // namespace marrow::track

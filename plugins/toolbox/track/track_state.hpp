@@ -2,12 +2,14 @@
 #pragma once
 // What a filter knows of a moving bone, from frame to frame.
 #include <Eigen/Core>
+#include <cstddef>
 #include <limits>
 #include <optional>
 #include <string>
 #include <vector>
 
-#include "marrow/domain/pose.hpp"
+#include "marrow/base/number_text.hpp"
+#include "marrow/domain/camera.hpp"
 #include "marrow/domain/verdict.hpp"
 #include "marrow/runtime/node/value.hpp"
 
@@ -76,8 +78,20 @@ struct AutoscoperTrack {
   using fields = Fields<&AutoscoperTrack::world_from_bone>;
 };
 
+/// How a frame is called in lists over "frame": its number from 1, with four digits at least.
+inline std::string frame_name(std::size_t number) { return formatted("{:04}", number); }
+
+/// What all devices show at one moment of a sequence: a view of each, with different names.
+struct SequenceFrame {
+  std::vector<View> views;
+
+  using fields = Fields<&SequenceFrame::views>;
+};
+
 }  // namespace marrow::track
 
 MARROW_VALUE_TYPE(marrow::track::TrackState, "track_state", 1)
 MARROW_VALUE_TYPE(marrow::track::Trajectory, "trajectory", 2)
 MARROW_VALUE_TYPE(marrow::track::AutoscoperTrack, "autoscoper_track", 1)
+
+MARROW_VALUE_TYPE(marrow::track::SequenceFrame, "sequence_frame", 1)

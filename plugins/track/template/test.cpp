@@ -3,7 +3,6 @@
 
 #include <marrow/testing/node.hpp>
 
-#include "marrow/toolbox/track/sequence.hpp"
 #include "marrow/toolbox/track/track_state.hpp"
 
 namespace node_test = marrow::node_test;

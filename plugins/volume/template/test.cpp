@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <gtest/gtest.h>
 
-#include <marrow/domain/volume.hpp>
 #include <marrow/testing/node.hpp>
 
 namespace node_test = marrow::node_test;

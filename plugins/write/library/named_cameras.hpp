@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 #include "marrow/base/error.hpp"
-#include "marrow/domain/list.hpp"
-#include "marrow/toolbox/exchange/camera_matrix.hpp"
+#include "marrow/toolbox/exchange/cameras.hpp"
 
 namespace marrow::write {
 

@@ -2,7 +2,7 @@
 #pragma once
 #include <filesystem>
 
-#include "marrow/domain/image.hpp"
+#include "marrow/domain/camera.hpp"
 #include "marrow/domain/volume.hpp"
 
 namespace marrow::write {

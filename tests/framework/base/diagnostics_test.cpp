@@ -29,15 +29,12 @@ TEST(Diagnostics, ControlCharactersAreWrittenOut) {
             "hint: did you mean '\\u202e'?\n");
 }
 
-TEST(Diagnostics, CaretStandsBelowTheColumn) {
+TEST(Diagnostics, CaretStandsBelowTheColumnAndLongLinesAreCutAroundIt) {
   EXPECT_EQ(shown("a: b", 4), "f:1:4: error: wrong\n  a: b\n     ^\n");
   EXPECT_EQ(shown("\ta: b\r\n", 5), "f:1:5: error: wrong\n   a: b\n      ^\n") << "a tab is one column";
   EXPECT_EQ(shown("größer: x", 11), "f:1:11: error: wrong\n  größer: x\n          ^\n") << "columns count bytes";
   EXPECT_EQ(shown("\x1b: x", 4), "f:1:4: error: wrong\n  \\x1b: x\n        ^\n");
   EXPECT_EQ(shown("a", 99), "f:1:99: error: wrong\n  a\n   ^\n");
-}
-
-TEST(Diagnostics, LongLinesAreCutAroundTheColumn) {
   const std::string line = std::string(5000, 'a') + "HERE" + std::string(5000, 'b'), text = shown(line, 5001);
   const std::size_t begin = text.find('\n') + 1, end = text.find('\n', begin), caret = text.find('^');
   const std::string quoted = text.substr(begin, end - begin);
@@ -62,7 +59,7 @@ TEST(Diagnostics, ManyAreCountedSomeShown) {
   EXPECT_EQ(all.sorted().size(), 1000u);
 }
 
-TEST(Diagnostics, AllOfAnotherCollectionOnce) {
+TEST(Diagnostics, MessagesAreCutAndThoseOfAnotherCollectionAddedOnce) {
   Diagnostics one, other;
   one.add({"f", 1, 1}, "a");
   other.add({"f", 1, 1}, "a");
@@ -70,9 +67,6 @@ TEST(Diagnostics, AllOfAnotherCollectionOnce) {
   other.add({"f", 1, 1}, "b");
   one.add_all(other);
   EXPECT_EQ(one.size(), 2u) << one.text();
-}
-
-TEST(Diagnostics, LongMessagesAreCut) {
   Diagnostics diagnostics;
   diagnostics.add({"f", 1, 1}, std::string(1000000, 'x'), std::string(1000000, 'y'));
   EXPECT_LT(diagnostics.text().size(), 2100u);

@@ -2,10 +2,9 @@
 // Names that become names of files.
 #include "marrow/base/file_names.hpp"
 
-#include <gtest/gtest.h>
-
 #include <random>
-#include <set>
+
+#include "tests/framework/fixture.hpp"
 
 namespace file_names_test {
 
@@ -13,14 +12,11 @@ using marrow::fault_of_name;
 using marrow::file_name_of;
 using Texts = std::vector<std::string>;
 
-TEST(FileNames, GoodOnes) {
+TEST(FileNames, GoodOnesAndBadOnesAndWhy) {
   for (const char* name :
        {"femur", "a b", "a.b", "1", "-5", "canny+bobyqa", "größer", "\u6f22", "a..b", "x.", "[1,_2]"})
     EXPECT_EQ(fault_of_name(name), "") << name;
   EXPECT_EQ(fault_of_name(std::string(100, 'x')), "");
-}
-
-TEST(FileNames, BadOnesAndWhy) {
   EXPECT_EQ(fault_of_name(""), "it is empty");
   EXPECT_EQ(fault_of_name(".."), "it begins with a dot");
   EXPECT_EQ(fault_of_name("."), "it begins with a dot");
@@ -61,7 +57,7 @@ TEST(FileNames, ThatLookLikeOthersAndWhy) {
   EXPECT_EQ(file_name_of("e\u0301"), "e%CC%81");
 }
 
-TEST(FileNames, OfAnyTextAreNamesOfFiles) {
+TEST(FileNames, OfAnyTextAreNamesOfFilesAndLongOnesEndWithAHash) {
   EXPECT_EQ(file_name_of("lateral 60 degrees.v2"), "lateral 60 degrees.v2");
   EXPECT_EQ(file_name_of("a/b"), "a%2Fb");
   EXPECT_EQ(file_name_of("a_b"), "a_b");
@@ -77,9 +73,6 @@ TEST(FileNames, OfAnyTextAreNamesOfFiles) {
   EXPECT_EQ(file_name_of("größer"), "größer");
   EXPECT_EQ(file_name_of("\u202e"), "%E2%80%AE");
   EXPECT_EQ(file_name_of("a\xff\x80"), "a%FF%80");
-}
-
-TEST(FileNames, LongTextsEndWithAHash) {
   const std::string one = file_name_of(std::string(300, 'x') + "1"), other = file_name_of(std::string(300, 'x') + "2");
   EXPECT_NE(one, other);
   EXPECT_EQ(one.size(), 200u);
@@ -112,6 +105,47 @@ TEST(FileNames, OfOneListAreDistinct) {
   EXPECT_EQ(marrow::distinct_names({"a", "b"}), (Texts{"a", "b"}));
   EXPECT_EQ(marrow::distinct_names({"a", "a", "b", "a"}), (Texts{"a", "a (2)", "b", "a (3)"}));
   EXPECT_EQ(marrow::distinct_names({"a", "a (2)", "a", "a (2)"}), (Texts{"a", "a (2)", "a (3)", "a (2) (2)"}));
+}
+
+namespace fs = std::filesystem;
+using marrow::plain_path;
+using runtime_fixture::Scratch;
+
+TEST(PlainPath, FoldersGoWithWhatLeadsOutOfThem) {
+  const Scratch scratch;
+  fs::create_directories(scratch.path / "a" / "b");
+  EXPECT_EQ(plain_path(scratch.path / "a/b/../../x"), scratch.path / "x");
+  EXPECT_EQ(plain_path(scratch.path / "./a/.//b/./x"), scratch.path / "a/b/x");
+  EXPECT_EQ(plain_path(scratch.path / "a/b/..").string(), (scratch.path / "a/").string());
+  EXPECT_EQ(plain_path(scratch.path / "a/").string(), (scratch.path / "a/").string());
+  EXPECT_EQ(plain_path("/../.."), "/");
+  EXPECT_EQ(plain_path("/../x"), "/x");
+}
+
+TEST(PlainPath, WhatIsNoFolderStays) {
+  const Scratch scratch;
+  scratch.write("file", "");
+  for (const char* name : {"file/../x", "missing/../x"})  // which the system does not find either
+    EXPECT_EQ(plain_path(scratch.path / name), scratch.path / name);
+}
+
+TEST(PlainPath, AfterALinkThePathGoesUpFromWhereItLeads) {
+  const Scratch scratch;
+  fs::create_directories(scratch.path / "here");
+  fs::create_directories(scratch.path / "real" / "inner" / "most");
+  fs::create_directory_symlink(scratch.path / "real" / "inner", scratch.path / "here" / "link");
+  for (const char* folder : {"here", "real"}) std::ofstream(scratch.path / folder / "file") << folder;
+  EXPECT_EQ(plain_path(scratch.path / "here/link/../file"), scratch.path / "here/link/../file");
+  EXPECT_EQ(plain_path(scratch.path / "here/link/../../x"), scratch.path / "here/link/../../x");
+  EXPECT_EQ(plain_path(scratch.path / "here/link/most/../x"), scratch.path / "here/link/x");
+  EXPECT_TRUE(fs::equivalent(plain_path(scratch.path / "real/../here/./link/../file"), scratch.path / "real/file"));
+}
+
+TEST(PlainPath, RelativeOnes) {
+  EXPECT_EQ(plain_path(""), "");
+  EXPECT_EQ(plain_path("."), ".");
+  EXPECT_EQ(plain_path("../../x"), "../../x");
+  EXPECT_EQ(plain_path("./x"), "x");
 }
 
 }  // namespace file_names_test

@@ -1,10 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "marrow/base/process_identity.hpp"
+#include "marrow/base/process_tree.hpp"
 
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include <algorithm>
 #include <csignal>
 
 #include "tests/framework/fixture.hpp"

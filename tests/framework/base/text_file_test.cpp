@@ -5,12 +5,10 @@
 #include <sched.h>
 #include <sys/stat.h>
 #include <sys/wait.h>
-#include <unistd.h>
 
 #include <thread>
 
 #include "tests/framework/fixture.hpp"
-#include "tests/harness/message_of.hpp"
 #include "tests/plugins/write/full_disk.hpp"
 
 namespace text_file_test {
@@ -18,13 +16,12 @@ namespace text_file_test {
 namespace fs = std::filesystem;
 using marrow::read_text_file;
 using marrow::write_text_file;
-using marrow::test::message_of;
 using runtime_fixture::Scratch;
 
 class TextFileTest : public testing::Test {
  protected:
   std::string fault_in_reading(const fs::path& file, std::uintmax_t most = 100) {
-    const std::string fault = message_of([&] { read_text_file(file, most); });
+    const std::string fault = MESSAGE_OF(read_text_file(file, most));
     return fault.starts_with(file.string()) ? fault.substr(file.string().size()) : fault;
   }
   std::size_t files() const {
@@ -75,22 +72,20 @@ TEST_F(TextFileTest, FullDiskLeavesTheOldFile) {
   const fs::path file = scratch.write("file", "old");
   {
     const marrow::test::FullDisk full(1000);
-    EXPECT_NE(
-        message_of([&] { write_text_file(file, std::string(5000, 'x')); }).find("cannot write " + file.string() + ": "),
-        std::string::npos);
-    EXPECT_NE(message_of([&] { write_text_file(scratch.path / "new", std::string(5000, 'x')); }), "");
+    EXPECT_HAS(MESSAGE_OF(write_text_file(file, std::string(5000, 'x'))), "cannot write " + file.string() + ": ");
+    EXPECT_NE(MESSAGE_OF(write_text_file(scratch.path / "new", std::string(5000, 'x'))), "");
   }
   EXPECT_EQ(read_text_file(file, 100), "old");
   EXPECT_EQ(files(), 1u);
 }
 
 TEST_F(TextFileTest, WhereItCannotWrite) {
-  EXPECT_EQ(message_of([&] { write_text_file(scratch.path / "no" / "file", "x"); }),
+  EXPECT_EQ(MESSAGE_OF(write_text_file(scratch.path / "no" / "file", "x")),
             "cannot write " + (scratch.path / "no" / "file").string() + ": No such file or directory");
   fs::create_directory(scratch.path / "folder");
-  EXPECT_NE(message_of([&] { write_text_file(scratch.path / "folder", "x"); }).find("directory"), std::string::npos);
+  EXPECT_HAS(MESSAGE_OF(write_text_file(scratch.path / "folder", "x")), "directory");
   const auto kinds = marrow::Kinds::files_and_pipes;
-  EXPECT_EQ(message_of([&] { write_text_file("/dev/full", "x", kinds); }), "cannot write /dev/full: the disk is full");
+  EXPECT_EQ(MESSAGE_OF(write_text_file("/dev/full", "x", kinds)), "cannot write /dev/full: the disk is full");
   write_text_file("/dev/null", "x", kinds);
   EXPECT_TRUE(fs::is_character_file("/dev/null"));
   EXPECT_EQ(files(), 1u);
@@ -137,7 +132,7 @@ TEST_F(TextFileTest, WritersOfTheSameNumberInTwoContainersDoNotMeet) {
       writers.push_back(in_container([&] {
         while (!fs::exists(begin)) continue;
         for (int i = 0; i < 50; ++i)
-          if (message_of([&] { write_text_file(file, "text"); }) != "") return false;
+          if (MESSAGE_OF(write_text_file(file, "text")) != "") return false;
         return true;
       }));
     scratch.write("begin", "");
@@ -155,7 +150,7 @@ TEST_F(TextFileTest, ReadsWhereStandardInputIsClosed) {
   const fs::path file = scratch.write("file", "text");
   const int kept = dup(STDIN_FILENO);
   close(STDIN_FILENO);
-  const std::string fault = message_of([&] { EXPECT_EQ(read_text_file(file, 100), "text"); });
+  const std::string fault = marrow::test::message_of([&] { EXPECT_EQ(read_text_file(file, 100), "text"); });
   dup2(kept, STDIN_FILENO);
   close(kept);
   EXPECT_EQ(fault, "");

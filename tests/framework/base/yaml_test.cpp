@@ -2,7 +2,8 @@
 // The rules by which all YAML is read.
 #include "marrow/base/yaml.hpp"
 
-#include <gtest/gtest.h>
+#include "marrow/base/json_text.hpp"
+#include "tests/harness/message_of.hpp"
 
 namespace yaml_test {
 
@@ -19,15 +20,12 @@ std::string refusal(const std::string& text, const marrow::YamlLimits& limits = 
   return "";
 }
 
-TEST(Yaml, Numbers) {
+TEST(Yaml, NumbersAndTruthValues) {
   EXPECT_EQ(marrow::yaml_number(scalar("+1.5e2")), 150);
   EXPECT_EQ(marrow::yaml_number(scalar("-0.25")), -0.25);
   EXPECT_EQ(marrow::yaml_number(scalar("010")), 10);
   for (const char* text : {"0x10", ".inf", ".nan", "nan", "1e999", "1,5", "'1'", "one", "[1]", "~"})
     EXPECT_EQ(marrow::yaml_number(scalar(text)), std::nullopt) << text;
-}
-
-TEST(Yaml, IntegersHaveNoLeadingZeros) {
   EXPECT_EQ(marrow::yaml_integer(scalar("10")), 10);
   EXPECT_EQ(marrow::yaml_integer(scalar("-9223372036854775808")), INT64_MIN);
   EXPECT_EQ(marrow::yaml_integer(scalar("0")), 0);
@@ -36,9 +34,6 @@ TEST(Yaml, IntegersHaveNoLeadingZeros) {
   EXPECT_TRUE(marrow::has_leading_zeros(scalar("010")));
   EXPECT_FALSE(marrow::has_leading_zeros(scalar("0.5")));
   EXPECT_FALSE(marrow::has_leading_zeros(scalar("0")));
-}
-
-TEST(Yaml, OnlyTrueAndFalse) {
   EXPECT_EQ(marrow::yaml_boolean(scalar("true")), true);
   EXPECT_EQ(marrow::yaml_boolean(scalar("false")), false);
   for (const char* text : {"yes", "True", "on", "1", "'true'"})
@@ -122,6 +117,43 @@ TEST(Yaml, Limits) {
   EXPECT_EQ(refusal("a: 1\n---\nb: 2\n"),
             "2: the file goes on after the end of its first document; keep one document per file");
   EXPECT_EQ(refusal("a: \"\\0\"\n"), "1: a text holds the character NUL (\\0); take it out");
+}
+
+// JSON that nobody vouches for.
+
+using marrow::test::message_of;
+
+std::string fault_in(const std::string& text) { return MESSAGE_OF(marrow::parse_json(text, "a.json")); }
+
+std::string nested(int levels) { return std::string(std::size_t(levels), '[') + std::string(std::size_t(levels), ']'); }
+
+TEST(JsonText, DeepNestingIsRefused) {
+  EXPECT_EQ(fault_in(nested(64)), "");
+  EXPECT_EQ(fault_in(nested(65)), "a.json: lists and objects are nested more than 64 deep");
+  EXPECT_HAS(fault_in(nested(1000000)), "nested");
+  std::string objects;
+  for (int i = 0; i < 100000; ++i) objects += "{\"a\":";
+  EXPECT_HAS(fault_in(objects), "nested");
+  EXPECT_EQ(fault_in("[\"" + std::string(100, '[') + "\\\"" + std::string(100, '{') + "\\\\\", [1]]"), "");
+}
+
+TEST(JsonText, FaultsNameTheirPlace) {
+  EXPECT_EQ(fault_in(""), "a.json:1:1: not valid JSON");
+  EXPECT_EQ(fault_in("{\"a\": 1,\n \"b\": x}"), "a.json:2:7: not valid JSON");
+  EXPECT_EQ(fault_in("[1, 1e999]"), "a.json: not valid JSON: a number in it is too large");
+  EXPECT_HAS(fault_in("[\"\xff\"]"), "not valid JSON") << "no text in UTF-8";
+}
+
+TEST(JsonText, WholeNumbersWithinBounds) {
+  const auto fault = [](const char* text) {
+    return MESSAGE_OF(marrow::integer_of(marrow::parse_json(text, ""), 1, 1024, "'threads'"));
+  };
+  EXPECT_EQ(fault("1"), "");
+  EXPECT_EQ(fault("1024"), "");
+  EXPECT_EQ(fault("1000000000"), "'threads' is 1000000000; expected a whole number from 1 to 1024");
+  EXPECT_EQ(fault("18446744073709551615"), "'threads' is 18446744073709551615; expected a whole number from 1 to 1024");
+  for (const char* text : {"0", "-1", "1.5", "1e3", "\"2\"", "null", "true", "[1]"})
+    EXPECT_HAS(fault(text), "expected a whole number") << text;
 }
 
 }  // namespace yaml_test

@@ -1,7 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <gtest/gtest.h>
-
-#include <cmath>
 #include <marrow/compare/case_rate.hpp>
 #include <marrow/domain/random.hpp>
 
@@ -40,12 +37,9 @@ TEST(CaseRate, CasesCountOnceWhereTheirStartsEndAlike) {
   }
 }
 
-TEST(CaseRate, OfNoneAndOfAllEndsAtZeroAndOne) {
+TEST(CaseRate, OfNoneOfAllAndOfCasesOfOneRate) {
   EXPECT_EQ(all_alike(5, 5, 4).interval().lower, 0);
   EXPECT_EQ(all_alike(5, 0, 4).interval().upper, 1);
-}
-
-TEST(CaseRate, RunsCountEachWhereEveryCaseHasTheSameRate) {
   CaseRate rate;
   for (int c = 0; c < 50; ++c)
     for (int s = 0; s < 4; ++s) rate.add(std::to_string(c), s < 2);
@@ -86,13 +80,10 @@ TEST(CaseRate, ExactIntervalsAreThoseOfTheBinomialDistribution) {
   EXPECT_EQ(all_alike(4, 4, 2).exact_interval(0.95).lower, 0);
 }
 
-TEST(CaseRate, OneCaseIsOneRun) {
+TEST(CaseRate, OneCaseIsOneRunAndNoneIsNoRate) {
   CaseRate rate;
   for (int s = 0; s < 30; ++s) rate.add("only", true);
   EXPECT_EQ(rate.effective_runs(), 1);
-}
-
-TEST(CaseRate, RefusesWhatIsNoRate) {
   EXPECT_EQ(MESSAGE_OF(CaseRate().interval()), "a success rate of no runs has no interval; give at least one run");
   EXPECT_EQ(MESSAGE_OF(all_alike(2, 1, 2).interval(95)),
             "the confidence is 95.000000; give a fraction between 0 and 1, such as 0.95");

@@ -1,11 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // Curves over time by hand-computed values, and what they refuse. tests/tools/marrow/curves_numbers_test.py compares
 // all figures with those of numpy and scipy.
-#include <gtest/gtest.h>
 
 #include <cmath>
-#include <limits>
-#include <marrow/compare/curve_band.hpp>
 #include <marrow/compare/curve_difference.hpp>
 
 #include "tests/harness/message_of.hpp"

@@ -27,20 +27,17 @@ class ExperimentFaults : public ExperimentFiles {
 const char* const kMapHint = "write it as  key: value  lines";
 const char* const kStartsHere = "the path starts at the experiment's file";
 
-TEST_F(ExperimentFaults, NoFile) {
+TEST_F(ExperimentFaults, NoFileOrNoYaml) {
   marrow::compare::read_experiment(scratch.path / "none.yaml", test_catalogue(), diagnostics);
   ASSERT_EQ(diagnostics.size(), 1u);
   EXPECT_HAS(diagnostics.text(),
              "none.yaml: error: the experiment file cannot be read: No such file or directory\n  hint: check the path");
-}
-
-TEST_F(ExperimentFaults, NoYaml) {
   read("experiment: 1\npipeline: [p.yaml\ncases: {}\n");
   EXPECT_HAS(diagnostics.text(), "e.yaml:2:11: error: this [ is not closed");
   expect_fault("- experiment\n", 1, "the experiment must be a map, got a list of 1", kMapHint);
 }
 
-TEST_F(ExperimentFaults, WhatIsMissing) {
+TEST_F(ExperimentFaults, HeadOfTheFile) {
   expect_fault(std::string("pipeline: p.yaml\n") + kCases + kAfterCases, 1, "the key 'experiment' is missing",
                "begin the file with  experiment: 1");
   expect_fault(std::string("experiment: 1\n") + kCases + kAfterCases, 1, "the key 'pipeline' is missing",
@@ -52,9 +49,6 @@ TEST_F(ExperimentFaults, WhatIsMissing) {
                "name the figures to compare, as  metrics: [errors.distal.final.mtre_mm]");
   expect_fault(kStart + kMetrics, 1, "there are no variants",
                "name at least one under  variants:  or options under  matrix:,  sweep:  or  tune:");
-}
-
-TEST_F(ExperimentFaults, HeadOfTheFile) {
   expect_fault_of("basline: one", "unknown key 'basline' in the experiment", "did you mean 'baseline'?");
   expect_fault_of("metrics: [other.value]", "'metrics' is given twice in the experiment", "the first is at line 7");
   expect_fault("experiment: 2\npipeline: p.yaml\n" + kGood.substr(kStart.find("cases")), 1,
@@ -177,7 +171,7 @@ TEST_F(ExperimentFaults, InputsBySeedNeedSeeds) {
                  "inputs of a simulation that differ between cases stand in 'simulate'");
 }
 
-TEST_F(ExperimentFaults, Simulation) {
+TEST_F(ExperimentFaults, SimulationAndSeeds) {
   expect_fault(kHead + "cases:\n  simulate: s.yaml\n" + kAfterCases, 4, "'simulate' must be a map, got 's.yaml'",
                kMapHint);
   expect_fault(kHead + "cases:\n  simulate: {seeds: 1..2}\n" + kAfterCases, 4, "'simulate' does not name its pipeline",
@@ -198,9 +192,6 @@ TEST_F(ExperimentFaults, Simulation) {
   expect_simulation_fault("draw: {x: [3, 1]}", "the range of 'x' ends before it begins");
   expect_simulation_fault("seed_input: shape", "'seed_input' must be a list", "write it as  seed_input: [a, b]");
   expect_simulation_fault("seed_input: [shpae]", "the pipeline has no input 'shpae'", "did you mean 'shape'?");
-}
-
-TEST_F(ExperimentFaults, Seeds) {
   const std::string ranges = "'seeds' must be a range such as 1..20, of at most 100000, or a list of integers";
   for (const char* wrong : {"5..1", "-1..3", "1..200000", "1..", "many", "7", "[]", "{}"})
     expect_simulation_fault(std::string("seeds: ") + wrong, ranges);

@@ -3,7 +3,6 @@
 #include "marrow/compare/experiment_figures.hpp"
 #include "experiment_files.hpp"
 #include "marrow/compare/cell.hpp"
-#include "marrow/compare/experiment_notes.hpp"
 
 namespace experiment_figures_test {
 
@@ -41,16 +40,13 @@ class ExperimentFigures : public ExperimentFiles {
   }
 };
 
-TEST_F(ExperimentFigures, AFigureThatTheNodeDoesNotDeclare) {
+TEST_F(ExperimentFigures, AFigureThatTheNodeDoesNotDeclareAndOnesThatItDoes) {
   with_metric("one.mtre_m");
   expect_only_fault(5, "output 'one' (test.declared) has no figure 'mtre_m'", "did you mean 'mtre_mm'?");
   with_metric("each.distal.frontal.medianpx");
   expect_only_fault(5, "output 'each' (test.declared) has no figure 'frontal.medianpx'", "known: mtre_mm, *.median_px");
   read("metrics: [one.mtre_mm]\nvariants: {a: {}}\ninitial_error: one.start_mm\n");
   expect_only_fault(6, "output 'one' (test.declared) has no figure 'start_mm'", "known: mtre_mm, *.median_px");
-}
-
-TEST_F(ExperimentFigures, WhatIsDeclaredPasses) {
   for (const char* path : {"one.mtre_mm", "one.frontal.median_px", "each.distal.mtre_mm",
                            "staged.distal.final.frontal.median_px", "free.distal.anything"}) {
     with_metric(path);
@@ -110,14 +106,11 @@ TEST_F(ExperimentFigures, ItemsThatTheCaseNames) {
   EXPECT_EQ(runner.items_of({0, 0, 0}, item), (std::vector<std::string>{"distal", "proximal"}));
 }
 
-TEST_F(ExperimentFigures, VariantsWithTheSameNodeAreAskedOnce) {
+TEST_F(ExperimentFigures, VariantsWithTheSameNodeAreAskedOnceAndLimitsChecked) {
   const std::string path = "metrics: [each.distal.mtre_mm, each.distal.frontal.median_px]\n";
   EXPECT_EQ(read(path + "variants: {a: {}, b: {plain.value: 2}, c: {each.uses: test.undeclared}}\n").named_items.size(),
             2u);  // one for each path
   EXPECT_EQ(read(path + "variants: {a: {}, b: {f.path: elsewhere}}\n").named_items.size(), 4u);
-}
-
-TEST_F(ExperimentFigures, LimitsThatNoFigureKeeps) {
   read("metrics: [{figure: one.mtre_mm, better: nearest_zero}]\nsuccess:\n  one.mtre_mm: -1\nvariants: {a: {}}\n");
   expect_only_fault(6, "the limit of 'one.mtre_mm' is -1, but its magnitude counts, which is never below 0", "");
 }

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 // Experiment files in a folder of their own, with a pipeline and cases beside them.
-#include <string>
 
 #include "marrow/compare/experiment.hpp"
 #include "tests/framework/fixture.hpp"

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 // What is read from experiment files.
-#include <set>
 
 #include "experiment_files.hpp"
 #include "marrow/compare/cell.hpp"

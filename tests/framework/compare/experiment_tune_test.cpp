@@ -68,7 +68,7 @@ TEST_F(ExperimentTune, ValuesAreRounded) {
   EXPECT_EQ(rule.values_at({-1, 2}), (std::vector<double>{10, 2.8}));
 }
 
-TEST_F(ExperimentTune, CasesAreSplit) {
+TEST_F(ExperimentTune, CasesAreSplitAndAFailedRunCountsAsTenTimesTheLimit) {
   Experiment training = good("options: {c.value: [10, 20]}, " + kRest), held_out = training;
   keep_training_cases(training);
   keep_held_out_cases(held_out);
@@ -76,9 +76,6 @@ TEST_F(ExperimentTune, CasesAreSplit) {
   ASSERT_EQ(held_out.cases.size(), 1u);
   EXPECT_EQ(training.cases[0].name, "a");
   EXPECT_EQ(held_out.cases[0].name, "b");
-}
-
-TEST_F(ExperimentTune, AFailedRunCountsAsTenTimesTheLimit) {
   const Experiment experiment =
       good("options: {c.value: [10, 20]}, " + kBy + "points: 9, training_cases: 1", "success: {number.value: 0.3}\n");
   EXPECT_DOUBLE_EQ(experiment.tune->failed_as, 3);
@@ -137,9 +134,6 @@ TEST_F(ExperimentTune, EachFaultIsSaid) {
                "sweep: {options: {c.count: [1, 2]}, grid: 2}\n");
   expect_fault("options: {c.value: [20, 10]}, " + kRest,
                "the range of 'c.value' must end above its beginning, got 20 to 10");
-}
-
-TEST_F(ExperimentTune, TheEndsOfRangesAndTheOptimizerAreChecked) {
   expect_fault("options: {c.valu: [10, 20]}, " + kRest, "'test.constant' has no option 'valu'",
                "did you mean 'value'?");
   expect_fault(

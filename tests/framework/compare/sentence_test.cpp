@@ -1,7 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <gtest/gtest.h>
-
-#include <limits>
 #include <marrow/compare/paired.hpp>
 
 #include "tests/harness/message_of.hpp"
@@ -24,14 +21,11 @@ constexpr double infinite = std::numeric_limits<double>::infinity();
 const Metric target_error{"target error", "mm"};
 const Metric unnamed{"", "mm"};
 
-TEST(Sentence, NamesADifference) {
+TEST(Sentence, SaysWhetherADifferenceIsShown) {
   EXPECT_EQ(sentence("canny", target_error, comparison_of(0.1234, 0.081, 0.1711), {1e-9}),
             "canny, target error: 0.12 mm worse, 95 % interval 0.08 to 0.17, 20 cases, p < 0.001");
   EXPECT_EQ(sentence("canny", unnamed, comparison_of(0.1234, 0.081, 0.1711), {0.0123}),
             "canny: 0.12 mm worse, 95 % interval 0.08 to 0.17, 20 cases, p = 0.012");
-}
-
-TEST(Sentence, SaysWhereNoneIsShown) {
   EXPECT_EQ(
       sentence("canny", unnamed, comparison_of(0.0112, -0.031, 0.0521), {0.6213}),
       "canny: no difference shown: 0.01 mm worse, 95 % interval 0.03 mm better to 0.05 mm worse, 20 cases, p = 0.62");
@@ -62,9 +56,6 @@ TEST(Sentence, SaysThatTooFewCasesCannotShowAnything) {
   EXPECT_EQ(sentence("canny", unnamed, comparison_of(12.34, 12.34, 12.34, 1), {1}),
             "canny: no difference shown: 12 mm worse, 1 case, p = 1; fewer than 6 cases cannot reach p < 0.05, and no "
             "interval is given");
-}
-
-TEST(Sentence, SaysThatTooFewCasesCannotShowAnythingAmongSoManyComparisons) {
   // The least p of 8 cases is 2 / 256 = 0.0078, which Holm multiplies by up to 10; that of 9 cases is 0.0039.
   EXPECT_EQ(sentence("canny", unnamed, comparison_of(0.9, 0.6, 1.1, 8), {0.078125, 10}),
             "canny: no difference shown: 0.9 mm worse, 95 % interval 0.6 to 1.1, 8 cases, p = 0.078; fewer than 9 "

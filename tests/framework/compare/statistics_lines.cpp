@@ -3,8 +3,8 @@
 #include <cstdio>
 #include <iostream>
 #include <marrow/base/error.hpp>
+#include <marrow/compare/bootstrap.hpp>
 #include <marrow/compare/case_rate.hpp>
-#include <marrow/compare/median_interval.hpp>
 #include <marrow/compare/paired.hpp>
 #include <sstream>
 

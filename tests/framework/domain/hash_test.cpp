@@ -39,15 +39,12 @@ cv::Mat some_pixels() {
   return pixels;
 }
 
-TEST(Hash, OfAnImageIsOfItsPixelsNotOfItsMemory) {
+TEST(Hash, OfAnImageIsOfItsPixelsShapeAndType) {
   const cv::Mat large = some_pixels();
   const cv::Mat part = large(cv::Rect(5, 6, 20, 10));
   ASSERT_FALSE(part.isContinuous());
   EXPECT_EQ(hash_of(marrow::Image{part}), hash_of(marrow::Image{part.clone()}));
   EXPECT_NE(hash_of(marrow::Image{part}), hash_of(marrow::Image{large(cv::Rect(6, 6, 20, 10))}));
-}
-
-TEST(Hash, OfAnImageKnowsItsShapeAndType) {
   const cv::Mat pixels(4, 6, CV_8U, cv::Scalar(0));
   std::set<marrow::Digest> seen;
   for (const cv::Mat& image : {pixels, cv::Mat(6, 4, CV_8U, cv::Scalar(0)), cv::Mat(4, 3, CV_16U, cv::Scalar(0)),
@@ -55,7 +52,7 @@ TEST(Hash, OfAnImageKnowsItsShapeAndType) {
     EXPECT_TRUE(seen.insert(hash_of(marrow::Image{image})).second) << image.size() << " type " << image.type();
 }
 
-TEST(Hash, OfAViewDependsOnEachField) {
+TEST(Hash, OfViewsAndVolumesDependsOnEachField) {
   expect_sensitive(
       marrow::View{"frontal", {some_pixels()}, some_camera(), {}}, [](auto& v) { v.name = "lateral"; },
       [](auto& v) { v.image.pixels = some_pixels() + 1; }, [](auto& v) { v.camera.width_px = 41; },
@@ -65,9 +62,6 @@ TEST(Hash, OfAViewDependsOnEachField) {
       [](auto& v) { v.camera.camera_from_world.source = "ct"; },
       [](auto& v) { v.camera.camera_from_world.target = "ct"; },
       [](auto& v) { v.mask = cv::Mat(30, 40, CV_8U, cv::Scalar(255)); });
-}
-
-TEST(Hash, OfAVolumeDependsOnEachField) {
   marrow::Volume volume;
   volume.grid.size = {2, 3, 1};
   volume.values = {1, 2, 3, 4, 5, 6};
@@ -81,16 +75,13 @@ TEST(Hash, OfAVolumeDependsOnEachField) {
       [](auto& v) { v.values[5] = 7; }, [](auto& v) { v.values.pop_back(); });
 }
 
-TEST(Hash, OfAMeshDependsOnEachField) {
+TEST(Hash, OfMeshesAndPosesDependsOnEachField) {
   expect_sensitive(
       marrow::test::box({1, 2, 3}, {4, 5, 6}), [](auto& m) { m.vertices_mm[7].z() += 1e-9; },
       [](auto& m) { std::swap(m.triangles[0], m.triangles[1]); }, [](auto& m) { m.frame = "world"; },
       [](auto& m) {
         m.vertices_mm.push_back({0, 0, 0});
       });
-}
-
-TEST(Hash, OfAPoseDependsOnEachField) {
   expect_sensitive(
       marrow::Pose{}, [](auto& p) { p.world_from_model.translation_mm.y() = 1; },
       [](auto& p) { p.frame.origin_mm.y() = 1; }, [](auto& p) { p.frame.axes(0, 0) = -1; },
@@ -136,16 +127,13 @@ TEST(Hash, OfACaseDependsOnNamesAndItems) {
       });
 }
 
-TEST(Hash, NeighboursDoNotRunTogether) {
+TEST(Hash, NeighboursDoNotRunTogetherAndHexIsWritten) {
   using Texts = std::vector<std::string>;
   EXPECT_NE(hash_of(Texts{"ab", "c"}), hash_of(Texts{"a", "bc"}));
   EXPECT_NE(hash_of(Texts{""}), hash_of(Texts{}));
   EXPECT_NE(hash_of(std::vector<int>{0}), hash_of(std::vector<int>{}));
   EXPECT_NE(hash_of(std::optional<int>{}), hash_of(std::optional<int>{0}));
   EXPECT_NE(hash_of(std::map<std::string, int>{{"a", 1}}), hash_of(std::map<std::string, int>{{"a", 2}}));
-}
-
-TEST(Hash, IsWrittenAsHex) {
   EXPECT_EQ((marrow::Digest{0xfedcba9876543210u, 0x1u}.hex()), "0000000000000001fedcba9876543210");
 }
 

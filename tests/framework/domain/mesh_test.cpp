@@ -1,8 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <gtest/gtest.h>
-
 #include <Eigen/LU>
-#include <marrow/domain/mesh.hpp>
 
 #include "tests/framework/domain/shapes.hpp"
 #include "tests/harness/message_of.hpp"
@@ -135,16 +132,13 @@ TEST(FragmentFrame, LongAxisAgreesWithPlusZ) {
   EXPECT_LT((frame.axes.col(0) - Vector3d(0.8, 0, 0.6)).norm(), 1e-6) << "+x made orthogonal to the long axis";
 }
 
-TEST(FragmentFrame, TheReferenceChangesAtNineTenthsAlongX) {
+TEST(FragmentFrame, AnotherReferenceWhereTheBoneLiesAlongX) {
   for (const double x : {0.89, 0.91, -0.91}) {
     const Vector3d along(x, 0, std::sqrt(1 - x * x));
     const marrow::FragmentFrame frame = fragment_frame(cylinder({1, 2, 3}, along, 10, 100, 32));
     const Vector3d expected = x == 0.89 ? Vector3d(Vector3d(along.z(), 0, -along.x())) : Vector3d(Vector3d::UnitY());
     EXPECT_LT((frame.axes.col(0) - expected).norm(), 1e-6) << x;
   }
-}
-
-TEST(FragmentFrame, UsesAnotherReferenceWhenTheBoneLiesAlongX) {
   const marrow::FragmentFrame frame =
       fragment_frame(cylinder({1, 2, 3}, Vector3d(0.99, 0, 0.141067359796658844), 10, 100, 32));
   EXPECT_LT((frame.axes.col(0) - Vector3d(0, 1, 0)).norm(), 1e-6);

@@ -48,13 +48,10 @@ TEST(Archive, ReadsBackWhatItTook) {
             (std::vector<bool>{true, false, true}));
 }
 
-TEST(Archive, ATruthValueIsZeroOrOne) {
+TEST(Archive, ATruthValueAndAChoiceAreOnesThatThereAre) {
   EXPECT_EQ(fault_of<bool>(std::string(1, '\2')), "the packed value holds a truth value that is neither 0 nor 1");
   EXPECT_EQ(fault_of<std::optional<int>>(std::string(5, '\7')),
             "the packed value holds a truth value that is neither 0 nor 1");
-}
-
-TEST(Archive, AChoiceIsOneThatThereIs) {
   EXPECT_EQ(fault_of<Side>(std::string(1, '\2')), "the packed value holds an unknown choice");
   EXPECT_EQ(fault_of<Side>(std::string(1, '\1')), "");
 }

@@ -2,7 +2,6 @@
 // What is wrong with a declaration is found when the plugin registers.
 #include <gtest/gtest.h>
 
-#include <limits>
 #include <set>
 
 #include "marrow/plugin.hpp"
@@ -157,6 +156,16 @@ TEST(Declaration, ChecksOfAKind) {
   EXPECT_EQ(plugin.kinds.front().info.checks.size(), 5u);
   EXPECT_EQ(plugin.kinds.front().faults, (std::vector<std::string>{"check 'bias': its limit is not a finite number",
                                                                    "check 'contract' is named twice"}));
+}
+TEST(Declaration, ASuiteOfAKindFromElsewhere) {
+  Plugin plugin;
+  plugin.suite("test", {});
+  EXPECT_EQ(plugin.kinds.front().faults, std::vector<std::string>{"its suite has no checks"});
+  marrow::conformance::Suite suite;
+  suite.accuracy = {{{"bias", "how far off", 1, "mm"}, nullptr}};
+  plugin.suite("test", suite);
+  EXPECT_TRUE(plugin.kinds.back().info.is_suite);
+  EXPECT_EQ(plugin.kinds.back().faults, std::vector<std::string>{});
 }
 
 }  // namespace declaration_test

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Pipelines that extend others, and files of settings.
-#include <cstdlib>
 
-#include "tests/framework/pipeline/layers_fixture.hpp"
+#include "tests/framework/pipeline/pipeline_fixture.hpp"
 
 namespace extends_test {
 
@@ -165,9 +164,6 @@ TEST_F(ExtendsTest, FaultsAreShownInTheFileThatHasThem) {
   expect_fault_in("p.yaml", 3, "set must be a map");
   extend("marrow: 2\n", "");
   EXPECT_GT(diagnostics.size(), 0u);
-}
-
-TEST_F(ExtendsTest, WhatIsRemovedButUsed) {
   extend(kBase, "nodes: {d: null}\n");
   expect_fault_in("base.yaml", 7, "there is no node 'd'");
 }

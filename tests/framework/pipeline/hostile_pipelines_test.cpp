@@ -29,7 +29,7 @@ TEST_F(PipelineTest, NameIsNoPath) {
   EXPECT_TRUE(diagnostics.empty()) << diagnostics.text();
 }
 
-TEST_F(PipelineTest, NameFromTheFileIsNoPathEither) {
+TEST_F(PipelineTest, NameIsNoPathAndOfOutputsAFileName) {
   for (const std::string& file :
        {std::string("...yaml"), std::string(".yaml"), std::string("a\nb.yaml"), std::string(120, 'x') + ".yaml"}) {
     diagnostics = Diagnostics();
@@ -39,24 +39,18 @@ TEST_F(PipelineTest, NameFromTheFileIsNoPathEither) {
     marrow::read_pipeline(scratch.write(file, with_key("name: x")), {}, test_catalogue(), diagnostics = Diagnostics());
     EXPECT_TRUE(diagnostics.empty()) << diagnostics.text();
   }
-}
-
-TEST_F(PipelineTest, NamesOfOutputsAreFileNames) {
   for (const char* name : {"a/b", "..", ".a", "' a'", "'a '", "'a\\b'"})
     expect_fault("marrow: 1\nnodes:\n  c: {uses: test.constant}\noutputs:\n  " + std::string(name) + ": c\n", 5, 3,
                  "an output's name becomes a file name: '", "use at most");
 }
 
-TEST_F(PipelineTest, NoControlCharactersInKeys) {
+TEST_F(PipelineTest, ControlCharactersInKeysAndTooLongAFile) {
   expect_fault(
       "marrow: 1\nnodes:\n  \"a\\e[31m\": {uses: test.constant}\n  c: {uses: test.constant}\noutputs: {o: c}\n", 3, 3,
       "in nodes holds a control character", "write it without");
   expect_fault("marrow: 1\nnodes:\n  c: {uses: test.constant}\noutputs: {o: c, \"a\\nb\": c}\n", 4, 17,
                "in outputs holds a control character");
   EXPECT_EQ(diagnostics.text().find('\x1b'), std::string::npos);
-}
-
-TEST_F(PipelineTest, TooLongAFile) {
   read(with_key("#" + std::string(4000000, 'x')));
   expect_shown("the pipeline file is longer than 4 MB");
 }
@@ -90,13 +84,10 @@ TEST_F(PipelineTest, AliasesThatMultiplyAreSaid) {
   EXPECT_EQ(std::get<double>(p.nodes[1].options[0]), 7.0) << "aliases are good for something";
 }
 
-TEST_F(PipelineTest, SecondDocumentAndNulAreSaid) {
+TEST_F(PipelineTest, SecondDocumentNulAndInputsThatMultiplyAreSaid) {
   expect_fault(with_key("help: x") + "---\nmarrow: 1\n", 6, 1, "the file goes on after the end of its first document");
   expect_fault(with_key("help: \"a\\0b\""), 2, 7, "a text holds the character NUL (\\0); take it out");
   read_good(with_key("help: x") + "...\n# the end\n");
-}
-
-TEST_F(PipelineTest, InputsThatMultiplyAreSaid) {
   std::string names;
   for (int i = 0; i < 20; ++i) names += "$a";
   read("marrow: 1\ninputs: {a: {type: text, default: " + std::string(20000, 'x') +

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Each allocation fails once: first the first, then the second, and so on. Each time std::bad_alloc is thrown, and
 // nothing crashes.
-#include <cstdlib>
-#include <functional>
 #include <new>
 
 #include "marrow/runtime/plugins/manifest.hpp"

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Pipelines as nodes of others.
-#include "tests/framework/pipeline/layers_fixture.hpp"
+#include "tests/framework/pipeline/pipeline_fixture.hpp"
 
 namespace parts_test {
 
@@ -22,7 +22,7 @@ class PartsTest : public pipeline_fixture::LayersTest {
   static inline const std::string kUse = "  d: {uses: test.draw}\n  plus: {uses: part.yaml, in: {to: d}}\n";
 };
 
-TEST_F(PartsTest, ItsNodesTakeItsPlace) {
+TEST_F(PartsTest, ItsNodesTakeItsPlaceAsOneWouldHaveWrittenThem) {
   const Pipeline p = good(whole(kUse));
   EXPECT_EQ(ids(p), "d plus/c plus/sum");
   EXPECT_EQ(wires(p, "plus/sum"), "a <- d, b <- plus/c");
@@ -30,9 +30,6 @@ TEST_F(PartsTest, ItsNodesTakeItsPlace) {
   EXPECT_EQ(number(p, "plus/c"), 3);
   EXPECT_EQ(p.files.size(), 2u);
   EXPECT_TRUE(p.notes.empty());
-}
-
-TEST_F(PartsTest, ItIsThePipelineThatOneWouldHaveWritten) {
   const std::string yaml = marrow::resolved_yaml(good(whole(kUse)));
   EXPECT_EQ(marrow::resolved_yaml(good(read(yaml))), yaml);
 }
@@ -111,7 +108,7 @@ TEST_F(PartsTest, ChangesReachIn) {
   EXPECT_EQ(only_fault().message, "the pipeline has no node 'x'");
 }
 
-TEST_F(PartsTest, APartIsSwappedForAnother) {
+TEST_F(PartsTest, APartIsSwappedForAnotherOrExtended) {
   scratch.write("other.yaml",
                 "marrow: 1\ninputs: {to: {type: metrics}}\nnodes:\n  c: {uses: test.draw}\n"
                 "  sum: {uses: test.add, in: {a: to, b: c}}\noutputs: {sum: sum}\n");
@@ -120,9 +117,6 @@ TEST_F(PartsTest, APartIsSwappedForAnother) {
                 "  plus: {uses: part.yaml, in: {to: d}, with: {by: 4}, set: {c.word: two}}\noutputs: {o: plus}\n");
   const Pipeline p = good(read("marrow: 1\nextends: base.yaml\nset: {plus.uses: other.yaml}\n"));
   EXPECT_EQ(node(p, "plus/c").info.name, "test.draw");
-}
-
-TEST_F(PartsTest, OneThatExtends) {
   scratch.write("more.yaml", "marrow: 1\nextends: part.yaml\nset: {c.value: 6}\n");
   EXPECT_EQ(number(good(whole("  d: {uses: test.draw}\n  plus: {uses: more.yaml, in: {to: d}}\n")), "plus/c"), 6);
 }
@@ -200,7 +194,7 @@ TEST_F(PartsTest, FaultsAreShownWhereTheyAre) {
   EXPECT_HAS(only_fault().message, "these nodes wait for each other in a circle: a/sum, b/sum");
 }
 
-TEST_F(PartsTest, ItsTypes) {
+TEST_F(PartsTest, ItsTypesAndAPartOfItself) {
   scratch.write("types.yaml",
                 "marrow: 1\ninputs:\n  a: {type: metrix}\n  b: {type: number, over: item}\n"
                 "  c: {type: metrics, default: 3}\n  d: {optional: true}\nnodes:\n"
@@ -212,15 +206,12 @@ TEST_F(PartsTest, ItsTypes) {
         "'over' is for inputs of data, and input 'b' is a number", "input 'c' is of type metrics, which has no default",
         "'optional' is for inputs of data, and input 'd' is a text", "give it a  default:  instead"})
     EXPECT_HAS(text, wanted) << wanted << "\n" << text;
-}
-
-TEST_F(PartsTest, APartOfItself) {
   scratch.write("self.yaml", "marrow: 1\nnodes:\n  s: {uses: self.yaml}\noutputs: {s: s}\n");
   whole("  plus: {uses: self.yaml}\n");
   expect_fault_in("self.yaml", 3, "'self.yaml' uses itself: a pipeline must not be its own part");
 }
 
-TEST_F(PartsTest, ManyParts) {
+TEST_F(PartsTest, ManyPartsAndNamesWithASlash) {
   scratch.write("n0.yaml", "marrow: 1\nnodes: {d: {uses: test.draw}}\noutputs: {d: d}\n");
   for (int i = 0; i < 7; ++i) {
     std::string nodes;
@@ -231,9 +222,6 @@ TEST_F(PartsTest, ManyParts) {
   EXPECT_HAS(diagnostics.text(), "the parts of the pipeline have 20000 nodes or more");
   whole("  plus: {uses: n7.yaml}\n");
   EXPECT_HAS(diagnostics.text(), "parts lie more than 8 deep in each other");
-}
-
-TEST_F(PartsTest, NamesWithASlash) {
   good(whole("  a/b: {uses: test.draw}\n", "o: a/b"));
   whole("  a/b: {uses: test.draw}\n  a: {uses: test.draw}\n", "o: a/b");
   expect_fault_in("p.yaml", 3, "the node's name 'a/b' has a slash", "slashes are for nodes of a body or of a part");

@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 // What is read from a good pipeline file, and how overrides change it.
+
 #include "marrow/base/file_names.hpp"
 #include "tests/framework/pipeline/pipeline_fixture.hpp"
 
 namespace pipeline_test {
 
-using marrow::Pipeline;
+using namespace marrow;
 using pipeline_fixture::PipelineTest;
 
 TEST_F(PipelineTest, GoodFileIsResolved) {
@@ -17,15 +18,12 @@ TEST_F(PipelineTest, GoodFileIsResolved) {
   EXPECT_EQ(p.nodes[2].id, "add") << "sources come before users";
   EXPECT_EQ(std::get<double>(p.nodes[0].options[0]), 3.0);
   EXPECT_EQ(std::get<std::string>(p.nodes[0].options[3]), "two");
-}
-
-TEST_F(PipelineTest, ResolvedYamlGivesTheSamePipeline) {
   const std::string text =
       "marrow: 1\nnodes:\n  c: {uses: test.constant, with: {value: 0.1, numbers: [1.5, 2]}}\n  s: {uses: test.sides}\n"
       "  n: {uses: test.sum, in: {items: [c, s.left]}}\noutputs: {o: n, p: s.both.a}\n";
-  const std::string once = marrow::resolved_yaml(read(text));
+  const std::string once = resolved_yaml(read(text));
   ASSERT_TRUE(diagnostics.empty()) << diagnostics.text();
-  EXPECT_EQ(marrow::resolved_yaml(read(once)), once);
+  EXPECT_EQ(resolved_yaml(read(once)), once);
   EXPECT_TRUE(diagnostics.empty()) << diagnostics.text();
 }
 
@@ -44,11 +42,11 @@ TEST_F(PipelineTest, ResolvedYamlKeepsEveryTextAndNumber) {
     p.nodes[0].options[4] = std::vector<double>{0.1, -0.0, 1e-300, 1.7976931348623157e308, 5e-324};
     p.nodes[0].options[6] = text.empty() ? text : "/folder " + text;
     p.nodes[1].options[0] = std::vector<std::string>{text, "b", text};
-    const bool is_name = marrow::fault_of_name(text).empty();
+    const bool is_name = fault_of_name(text).empty();
     if (is_name) p.name = text;
-    const Pipeline again = read_good(marrow::resolved_yaml(p));
+    const Pipeline again = read_good(resolved_yaml(p));
     for (std::size_t i = 0; i < p.nodes.size(); ++i)
-      EXPECT_EQ(again.nodes[i].options, p.nodes[i].options) << marrow::resolved_yaml(p);
+      EXPECT_EQ(again.nodes[i].options, p.nodes[i].options) << resolved_yaml(p);
     if (is_name) {
       EXPECT_EQ(again.name, text);
     }
@@ -85,7 +83,7 @@ TEST_F(PipelineTest, AnEmptyPathStaysEmpty) {
   const std::string text =
       "marrow: 1\ninputs: {x: {type: path, default: \"\"}}\nnodes:\n  c: {uses: test.constant, with: {path: $x}}\n"
       "outputs: {c: c}\n";
-  for (const auto& arguments : {marrow::PipelineArguments{}, marrow::PipelineArguments{{{"x", ""}}, {}}}) {
+  for (const auto& arguments : {PipelineArguments{}, PipelineArguments{{{"x", ""}}, {}}}) {
     const Pipeline p = read_good(text, arguments);
     EXPECT_EQ(std::get<std::string>(p.nodes[0].options[6]), "") << "not the folder of the pipeline";
   }
@@ -118,13 +116,10 @@ TEST_F(PipelineTest, OverrideLeavesAliasesAlone) {
   EXPECT_EQ(std::get<double>(p.nodes[0].options[0]), 7.0);
   EXPECT_EQ(std::get<double>(p.nodes[1].options[0]), 2.0);
 }
-TEST_F(PipelineTest, FaultsOfOverrides) {
+TEST_F(PipelineTest, FaultsOfOverridesAndAxes) {
   expect_fault(kTwoNodes, 0, 0, "the pipeline has no node 'cc'", "did you mean 'c'?", {{}, {{"cc.value", "7"}}});
   expect_fault(kTwoNodes, 0, 0, "has no option 'valu'", "did you mean 'value'?", {{}, {{"c.valu", "7"}}});
   expect_fault(kTwoNodes, 0, 0, "an override is node.option=value", "", {{}, {{"c", "7"}}});
-}
-
-TEST_F(PipelineTest, AxesAreFound) {
   const Pipeline p = read_good(
       "marrow: 1\nnodes:\n  s: {uses: test.sides}\n  l: {uses: test.letters}\n  a: {uses: test.add, in: {a: s.both, b: "
       "l}}\n"
@@ -140,12 +135,93 @@ TEST_F(PipelineTest, SourcesComeFirstInTheFilesOrderOtherwise) {
       "  c: {uses: test.add, in: {a: a}}\n  b: {uses: test.constant}\n  f: {uses: test.add, in: {a: c}}\noutputs: {o: "
       "e, p: f}\n");
   std::string order;
-  for (const marrow::PipelineNode& node : p.nodes) order += node.id;
+  for (const PipelineNode& node : p.nodes) order += node.id;
   EXPECT_EQ(order, "acbfde");
   for (std::size_t i = 0; i < p.nodes.size(); ++i)
-    for (const marrow::Wire& wire : p.nodes[i].wires)
-      for (const marrow::Reference& source : wire.sources) EXPECT_EQ(p.node_of(source).id, source.text);
+    for (const Wire& wire : p.nodes[i].wires)
+      for (const Reference& source : wire.sources) EXPECT_EQ(p.node_of(source).id, source.text);
   EXPECT_EQ(p.node_of(p.outputs[0].source).id, "e");
+}
+
+// Calls of one node with values from memory.
+
+using Inputs = std::vector<std::pair<std::string, Value>>;
+using Options = std::vector<std::pair<std::string, std::string>>;
+
+Value number(double value) {
+  return Value::of<Metrics>(std::make_shared<const Metrics>(Metrics{{{"value", value, ""}}}));
+}
+
+Value list_of(const std::vector<double>& values, const std::string& axis) {
+  Value list = number(0);
+  list.data.reset();
+  list.axis = axis;
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    list.names.push_back(std::string(1, char('a' + i)));
+    list.items.push_back(number(values[i]));
+  }
+  return list;
+}
+
+double number_in(const Value& value) { return value.as<Metrics>().items.at(0).value; }
+
+/// Calls the node, which must succeed, and returns its output.
+Value called(const std::string& name, const Inputs& inputs, const Options& options = {}) {
+  Diagnostics diagnostics;
+  const Catalogue& catalogue = runtime_fixture::test_catalogue();
+  const OneNode one = pipeline_of_node(name, inputs, options, catalogue, diagnostics);
+  EXPECT_TRUE(diagnostics.empty()) << diagnostics.text();
+  RunSettings settings;
+  settings.given = one.given;
+  const RunResult result = run_pipeline(one.pipeline, catalogue, settings);
+  EXPECT_FALSE(result.failed());
+  return value_of(result, one.pipeline.outputs.at(0).source);
+}
+
+/// All faults, one a line.
+std::string faults(const std::string& name, const Inputs& inputs, const Options& options = {}) {
+  Diagnostics diagnostics;
+  pipeline_of_node(name, inputs, options, runtime_fixture::test_catalogue(), diagnostics);
+  std::string text;
+  for (const Diagnostic& one : diagnostics.sorted())
+    text += one.place.file + ": " + one.message + (one.hint.empty() ? "" : " [" + one.hint + "]") + "\n";
+  return text;
+}
+
+TEST(OneNodeTest, TakesInputsAndOptionsAndIsCalledForEachItem) {
+  EXPECT_EQ(number_in(called("test.add", {{"a", number(2)}, {"b", number(5)}})), 7);
+  EXPECT_EQ(number_in(called("test.constant", {}, {{"value", "3.5"}})), 3.5);
+  const Value sums = called("test.add", {{"a", list_of({1, 2}, "letter")}, {"b", number(10)}});
+  EXPECT_EQ(sums.axis, "letter");
+  EXPECT_EQ(sums.names, (std::vector<std::string>{"a", "b"}));
+  EXPECT_EQ(number_in(sums.items.at(1)), 12);
+  EXPECT_EQ(number_in(called("test.sum", {{"items", list_of({1, 2, 4}, "side")}})), 7) << "taken whole";
+}
+
+TEST(OneNodeTest, NestsListsOverDifferentAxes) {
+  const Value sums = called("test.add", {{"a", list_of({1, 2}, "row")}, {"b", list_of({10, 20, 30}, "column")}});
+  EXPECT_EQ(sums.axis, "row");
+  EXPECT_EQ(sums.items.at(1).axis, "column");
+  EXPECT_EQ(number_in(sums.items.at(1).items.at(2)), 32);
+}
+
+TEST(OneNodeTest, AllFaultsComeAtOnceWithTheirPlaces) {
+  const Value other = Value::of<Stop>(std::make_shared<const Stop>());
+  EXPECT_EQ(faults("test.add", {{"a", other}, {"c", number(1)}}, {{"valu", "1"}}),
+            "test.add(a): input 'a' of test.add expects metrics, got stop [first]\n"
+            "test.add(c): 'test.add' has no input 'c' [did you mean 'a'?]\n"
+            "test.add(valu): 'test.add' has no option 'valu' [there are none]\n");
+  EXPECT_EQ(faults("test.add", {}), "test.add(a): test.add needs the input 'a', of type metrics [first]\n");
+  EXPECT_EQ(number_in(called("test.add", {{"a", number(2)}})), 2) << "the other input is optional";
+  EXPECT_HAS(faults("test.constant", {}, {{"count", "-1"}, {"value", "much"}}),
+             "option 'count' of test.constant: -1 is below the least allowed, 0\n");
+  EXPECT_HAS(faults("test.constant", {}, {{"count", "-1"}, {"value", "much"}}),
+             "option 'value' of test.constant: expected a number");
+  EXPECT_EQ(faults("test.ad", {}), "test.ad: unknown node 'test.ad' [did you mean 'test.add'?]\n");
+  const std::string found = faults("test.any", {});
+  EXPECT_EQ(std::count(found.begin(), found.end(), '\n'), 1) << found;
+  EXPECT_HAS(found, "'in.items'");
+  EXPECT_HAS(found, "'in.adder'");
 }
 
 }  // namespace pipeline_test

@@ -47,7 +47,7 @@ class RelationsTest : public pipeline_fixture::PipelineTest {
   const std::string kBefore = "marrow: 1\nnodes:\n  one: {uses: test.number}\n  n: ";
 };
 
-TEST_F(RelationsTest, NotAbove) {
+TEST_F(RelationsTest, NotAboveAndBelow) {
   expect_kept("{uses: test.limits}");
   expect_kept("{uses: test.limits, with: {low: 75}}");
   expect_kept("{uses: test.limits, with: {low: 90, high: 90.5}}");
@@ -55,9 +55,6 @@ TEST_F(RelationsTest, NotAbove) {
                 "option 'low' of test.limits is 90, which is above option 'high' (75)");
   expect_broken("{uses: test.limits, with: {high: 49.5}}", "high",
                 "option 'low' of test.limits is 50, which is above option 'high' (49.5)");
-}
-
-TEST_F(RelationsTest, Below) {
   expect_kept("{uses: test.limits, with: {near_mm: 999.9}}");
   expect_kept("{uses: test.limits, with: {first: 9}}");
   expect_broken("{uses: test.limits, with: {far_mm: 600}}", "far_mm",
@@ -68,7 +65,7 @@ TEST_F(RelationsTest, Below) {
                 "option 'first' of test.limits is 10, which is not below option 'last' (10)");
 }
 
-TEST_F(RelationsTest, SameLength) {
+TEST_F(RelationsTest, LengthsOfLists) {
   expect_kept("{uses: test.lists}");
   expect_kept("{uses: test.lists, with: {alpha_deg: [1, 2, 3], beta_deg: [4, 5, 6]}}");
   expect_kept("{uses: test.lists, with: {alpha_deg: [], beta_deg: []}}");
@@ -79,9 +76,6 @@ TEST_F(RelationsTest, SameLength) {
                 "options 'alpha_deg' (0) and 'beta_deg' (2) of test.lists must have the same length");
   expect_broken("{uses: test.lists, with: {weights: [1]}}", "weights",
                 "options 'sizes' (0), 'weights' (1) and 'labels' (0) of test.lists must have the same length");
-}
-
-TEST_F(RelationsTest, AsManyOrNone) {
   expect_kept("{uses: test.lists, with: {paths: [a, b, c]}}");
   expect_kept("{uses: test.lists, with: {paths: [a, b, c], names: []}}");
   expect_kept("{uses: test.lists, with: {paths: [a, b, c], names: [x, y, z]}}");
@@ -92,7 +86,7 @@ TEST_F(RelationsTest, AsManyOrNone) {
                 "option 'names' of test.lists has 2 items, but 'paths' has 3", hint);
 }
 
-TEST_F(RelationsTest, ExactlyOne) {
+TEST_F(RelationsTest, HowManyAreGivenAndAllDistinct) {
   expect_kept("{uses: test.one_of_two, with: {file: a}}");
   expect_kept("{uses: test.one_of_two, in: {number: one}}");
   expect_kept("{uses: test.one_of_two, in: {number: one}, with: {file: ''}}");
@@ -108,18 +102,12 @@ TEST_F(RelationsTest, ExactlyOne) {
                 "n:", "test.one_of_three needs exactly one of 'in.number', 'file' and 'words', got none");
   expect_broken("{uses: test.one_of_three, in: {number: one}, with: {words: [a]}}", "words",
                 "test.one_of_three needs exactly one of 'in.number', 'file' and 'words', got 'in.number' and 'words'");
-}
-
-TEST_F(RelationsTest, AtLeastOne) {
   expect_kept("{uses: test.one_or_both, with: {file: a}}");
   expect_kept("{uses: test.one_or_both, in: {number: one}, with: {file: a}}");
   expect_broken("{uses: test.one_or_both}",
                 "n:", "test.one_or_both needs at least one of 'in.number' and 'file', got none");
   expect_broken("{uses: test.each_once, with: {words: []}}", "words", "option 'words' of test.each_once is empty",
                 "give one item or more");
-}
-
-TEST_F(RelationsTest, Distinct) {
   expect_kept("{uses: test.each_once, with: {words: [a, A, b], sizes: [1, 2, 1.5]}}");
   expect_broken("{uses: test.each_once, with: {words: [b, a, b]}}", "words",
                 "option 'words' of test.each_once has 'b' twice", "give each item once");

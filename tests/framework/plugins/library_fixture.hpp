@@ -4,7 +4,6 @@
 
 #include "marrow/base/framework_file.hpp"
 #include "marrow/base/regular_file.hpp"
-#include "marrow/runtime/plugins/library.hpp"
 #include "tests/framework/fixture.hpp"
 
 namespace library_fixture {

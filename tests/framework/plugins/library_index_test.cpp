@@ -4,10 +4,8 @@
 #include "marrow/runtime/plugins/library_index.hpp"
 
 #include <fcntl.h>
-#include <sys/stat.h>
 
-#include <chrono>
-#include <set>
+#include <elf.h>
 #include <thread>
 
 #include "marrow/runtime/plugins/manifest.hpp"
@@ -15,6 +13,7 @@
 
 namespace library_index_test {
 
+using namespace marrow;
 namespace fs = std::filesystem;
 using library_fixture::kGood;
 
@@ -30,13 +29,11 @@ class LibraryIndexTest : public library_fixture::LibraryTest {
     fs::copy_file(kGood, library(name));
     fs::copy_file(fs::path(kGood).replace_extension(".json"), manifest(name));
   }
-  std::optional<marrow::LibraryInfo> found(const fs::path& file) {
-    return marrow::LibraryIndex(file.parent_path()).find(file);
-  }
+  std::optional<LibraryInfo> found(const fs::path& file) { return LibraryIndex(file.parent_path()).find(file); }
   bool are_kept(const std::vector<fs::path>& files) {
     for (const fs::path& file : files) {
       const auto until = std::chrono::steady_clock::now() + std::chrono::seconds(10);
-      while (marrow::Catalogue({file.parent_path()}), !found(file)) {
+      while (Catalogue({file.parent_path()}), !found(file)) {
         if (std::chrono::steady_clock::now() > until) return false;
         std::this_thread::sleep_for(std::chrono::milliseconds(100));
       }
@@ -54,13 +51,13 @@ TEST_F(LibraryIndexTest, IsUsedUntilSomethingChanges) {
   for (const std::string& name : names) make(name), files.push_back(library(name));
   if (!are_kept(files)) GTEST_SKIP() << kNotKept;
 
-  const marrow::LibraryInfo expected = marrow::library_info(library("same"), framework);
-  const std::optional<marrow::LibraryInfo> kept = found(library("same"));
+  const LibraryInfo expected = library_info(library("same"), framework);
+  const std::optional<LibraryInfo> kept = found(library("same"));
   ASSERT_TRUE(kept);
-  EXPECT_EQ(marrow::manifest_text(*kept), marrow::manifest_text(expected));
+  EXPECT_EQ(manifest_text(*kept), manifest_text(expected));
   EXPECT_EQ(kept->build_id, expected.build_id);
   EXPECT_EQ(kept->file, expected.file);
-  EXPECT_EQ(marrow::Catalogue({folder("same")}).library_of("test.add")->build_id, expected.build_id);
+  EXPECT_EQ(Catalogue({folder("same")}).library_of("test.add")->build_id, expected.build_id);
 
   std::ofstream(library("longer"), std::ios::app | std::ios::binary) << "another build";
   struct stat before {};
@@ -75,10 +72,9 @@ TEST_F(LibraryIndexTest, IsUsedUntilSomethingChanges) {
   fs::permissions(folder("open_folder"), fs::perms(0777));
   fs::remove(library("removed"));
   for (const std::string& name : names) EXPECT_EQ(found(library(name)).has_value(), name == "same") << name;
-  EXPECT_TRUE(marrow::Catalogue({folder("removed")}).libraries().empty());
+  EXPECT_TRUE(Catalogue({folder("removed")}).libraries().empty());
   for (const std::string name : {"written", "open_folder"})
-    EXPECT_TRUE(
-        marrow::Catalogue({folder(name)}).libraries().at(0).refused.starts_with("is not trusted, because others may"));
+    EXPECT_TRUE(Catalogue({folder(name)}).libraries().at(0).refused.starts_with("is not trusted, because others may"));
 
   setenv("LD_LIBRARY_PATH", folder("same").c_str(), 1);
   EXPECT_FALSE(found(library("same"))) << "the loader searches elsewhere";
@@ -87,7 +83,7 @@ TEST_F(LibraryIndexTest, IsUsedUntilSomethingChanges) {
   EXPECT_FALSE(found(library("same")));
   unsetenv("MARROW_TRUST_ALL_PLUGINS");
   EXPECT_TRUE(found(library("same")));
-  marrow::LibraryIndex::forget(folder("same"));
+  LibraryIndex::forget(folder("same"));
   EXPECT_FALSE(found(library("same")));
 }
 
@@ -100,7 +96,7 @@ TEST_F(LibraryIndexTest, LinkedLibrariesCount) {
       fs::copy_file(linked / "libs1" / one, folder(name) / "libs" / one);
     fs::copy_file(linked / "linked.so", folder(name) / "linked.so");
     files.push_back(folder(name) / "linked.so");
-    marrow::write_manifest(marrow::describe_library(files.back()));
+    write_manifest(describe_library(files.back()));
   }
   if (!are_kept(files)) GTEST_SKIP() << kNotKept;
   fs::copy_file(linked / "libs2" / "libtest_deep.so", folder("other") / "libs" / "libtest_deep.so",
@@ -126,10 +122,69 @@ TEST_F(LibraryIndexTest, DamageCostsOnlyTime) {
     std::ofstream(file, std::ios::binary) << text;
     EXPECT_FALSE(found(library("plugins")));
   }
-  EXPECT_NE(marrow::Catalogue({folder("plugins")}).find("test.add"), nullptr);
+  EXPECT_NE(Catalogue({folder("plugins")}).find("test.add"), nullptr);
   EXPECT_EQ(text_of(file), whole) << "made anew";
   setenv("XDG_CACHE_HOME", "/proc/self/none", 1);
-  EXPECT_NE(marrow::Catalogue({folder("plugins")}).find("test.add"), nullptr);
+  EXPECT_NE(Catalogue({folder("plugins")}).find("test.add"), nullptr);
+}
+
+// The build id of an ELF file, in files made by hand.
+
+template <class T>
+std::string bytes(const T& value) {
+  return std::string(reinterpret_cast<const char*>(&value), sizeof value);
+}
+
+/// A note as it stands in a file: name and content are filled up to four bytes.
+std::string note(unsigned type, std::string name, std::string content) {
+  const Elf64_Nhdr header{unsigned(name.size()), unsigned(content.size()), type};
+  name.resize((name.size() + 3) / 4 * 4, '\0');
+  content.resize((content.size() + 3) / 4 * 4, '\0');
+  return bytes(header) + name + content;
+}
+
+const std::string kGnu("GNU", 4);
+
+class BuildNote : public testing::Test {
+ protected:
+  /// Of a file whose second segment has these notes.
+  std::string found(const std::string& notes, unsigned type = PT_NOTE) {
+    Elf64_Ehdr header{};
+    std::memcpy(header.e_ident, ELFMAG, SELFMAG);
+    header.e_phentsize = sizeof(Elf64_Phdr);
+    header.e_phnum = 2;
+    header.e_phoff = sizeof header;
+    Elf64_Phdr code{}, segment{};
+    code.p_type = PT_LOAD;
+    segment.p_type = type;
+    segment.p_offset = sizeof header + 2 * sizeof segment;
+    segment.p_filesz = notes.size();
+    return of(bytes(header) + bytes(code) + bytes(segment) + notes);
+  }
+  std::string of(const std::string& content) { return build_note(RegularFile(scratch.write("lib.so", content))); }
+  runtime_fixture::Scratch scratch;
+};
+
+TEST_F(BuildNote, IsFoundAmongOthers) {
+  const std::string id = note(NT_GNU_BUILD_ID, kGnu, "twenty bytes of id..");
+  EXPECT_EQ(found(id), "twenty bytes of id..");
+  EXPECT_EQ(found(note(NT_GNU_BUILD_ID, "Other", "a") + note(NT_GNU_ABI_TAG, kGnu, "abcde") + id),
+            "twenty bytes of id..");
+  EXPECT_EQ(found(note(NT_GNU_BUILD_ID, kGnu, "short") + id), "short");
+}
+
+TEST_F(BuildNote, IsEmptyWhereThereIsNone) {
+  EXPECT_EQ(found(""), "");
+  EXPECT_EQ(found(note(NT_GNU_ABI_TAG, kGnu, "abcd")), "");
+  EXPECT_EQ(found(note(NT_GNU_BUILD_ID, kGnu, "abcd"), PT_DYNAMIC), "") << "a segment of another kind";
+  EXPECT_EQ(of(""), "");
+  EXPECT_EQ(of(std::string(100, 'x')), "") << "no ELF file";
+  const std::string whole = note(NT_GNU_BUILD_ID, kGnu, "twenty bytes of id..");
+  for (std::size_t size = 0; size < whole.size(); ++size) EXPECT_EQ(found(whole.substr(0, size)), "") << size;
+  for (const unsigned size : {1u << 20, ~0u}) {
+    EXPECT_EQ(found(bytes(Elf64_Nhdr{size, 4, NT_GNU_BUILD_ID}) + whole), "");
+    EXPECT_EQ(found(bytes(Elf64_Nhdr{4, size, NT_GNU_BUILD_ID}) + whole), "");
+  }
 }
 
 }  // namespace library_index_test

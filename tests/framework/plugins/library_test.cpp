@@ -3,18 +3,14 @@
 #include <dlfcn.h>
 #include <elf.h>
 
-#include <set>
-
 #include "marrow/runtime/plugins/manifest.hpp"
 #include "tests/framework/plugins/library_fixture.hpp"
-#include "tests/harness/message_of.hpp"
 
 namespace library_test {
 
 namespace fs = std::filesystem;
 using library_fixture::kBad;
 using library_fixture::kGood;
-using marrow::test::message_of;
 using nlohmann::json;
 
 class LibraryTest : public library_fixture::LibraryTest {
@@ -45,7 +41,7 @@ class LibraryTest : public library_fixture::LibraryTest {
     const fs::path file = copy_with_invented(invent);
     const marrow::Catalogue catalogue({scratch.path / "plugins"});
     ASSERT_EQ(catalogue.libraries().at(0).note, "");
-    EXPECT_EQ(message_of([&] { catalogue.load("test.constant"); }),
+    EXPECT_EQ(MESSAGE_OF(catalogue.load("test.constant")),
               file.string() + " is not what its description says: " + reason + "; run 'marrow describe " +
                   file.string() + " --write', or remove " + fs::path(file).replace_extension(".json").string());
   }
@@ -265,20 +261,20 @@ TEST_F(LinkedLibraryTest, AnotherLibraryThanTheDescribedOneIsFoundOut) {
   put(2, "libtest_deep.so", scratch.path / "elsewhere");
   // Loaded before under the same name, it is what the plugin gets.
   ASSERT_NE(dlopen((scratch.path / "elsewhere" / "libtest_deep.so").c_str(), RTLD_NOW), nullptr);
-  const std::string said = message_of([&] { catalogue.load("test.linked"); });
-  EXPECT_NE(said.find("it loads another libtest_deep.so ("), std::string::npos) << said;
+  const std::string said = MESSAGE_OF(catalogue.load("test.linked"));
+  EXPECT_HAS(said, "it loads another libtest_deep.so (") << said;
 }
 TEST_F(LibraryTest, LinkedLibraryThatIsNoFileMakesTheManifestStale) {
   for (const std::string path : {"/dev/zero", "/", "/nonexistent/lib.so"}) {
     const fs::path file = copy_with_invented([&](json& j) { j["linked"].push_back({{"path", path}, {"size", 0}}); });
-    EXPECT_NE(marrow::library_info(file, framework).note.find("its manifest is stale ("), std::string::npos) << path;
+    EXPECT_HAS(marrow::library_info(file, framework).note, "its manifest is stale (") << path;
   }
 }
 TEST_F(LibraryTest, LibraryThatChangesAfterItWasDescribedIsNotUsed) {
   const fs::path file = copy_good(true);
   const marrow::Catalogue catalogue({scratch.path / "plugins"});
   std::ofstream(file, std::ios::app | std::ios::binary) << "another build";
-  EXPECT_EQ(message_of([&] { catalogue.load("test.add"); }),
+  EXPECT_EQ(MESSAGE_OF(catalogue.load("test.add")),
             file.string() + " was changed since this program began; start it again");
 }
 TEST_F(LibraryTest, WrongDescriptionInTheCacheIsForgotten) {

@@ -2,11 +2,9 @@
 // Manifests whose checksum is right, because anyone can compute it, but whose content no library can have registered.
 #include "marrow/runtime/plugins/manifest.hpp"
 
-#include <functional>
 #include <random>
 
 #include "tests/framework/fixture.hpp"
-#include "tests/harness/message_of.hpp"
 
 namespace manifest_test {
 
@@ -116,12 +114,10 @@ void expect_consistent(const marrow::LibraryInfo& info) {
     }
 }
 
-TEST(Manifest, IsReadAsItWasWritten) {
+TEST(Manifest, IsReadAsItWasWrittenWithADigestInHexadecimal) {
   const marrow::LibraryInfo info = library();
   EXPECT_EQ(marrow::difference(info, marrow::manifest_from_text(marrow::manifest_text(info))), "");
   expect_consistent(info);
-}
-TEST(Manifest, DigestIsHexadecimal) {
   expect_refused([](json& j) { j["library"] = std::string(32, 'z'); },
                  "the library's digest is not 32 hexadecimal digits");
   expect_refused([](json& j) { j["library"] = "12"; }, "the library's digest is not 32 hexadecimal digits");
@@ -146,11 +142,9 @@ TEST(Manifest, EveryByteIsCovered) {
   document.erase("checksum");
   expect_refused(document.dump(), "it is damaged: it has no checksum");
 }
-TEST(Manifest, OptionTypesExist) {
+TEST(Manifest, OptionTypesExistAndDefaultsHaveThem) {
   expect_refused([](json& j) { j["nodes"][0]["options"][0]["type"] = "quaternion"; },
                  "there is no type of options 'quaternion'");
-}
-TEST(Manifest, DefaultsHaveTheirOptionsType) {
   for (std::size_t i = 0; i < 8; ++i)
     for (const json& wrong : {json(), json::object(), json{1, "x"}})
       expect_refused([&](json& j) { j["nodes"][0]["options"][i]["default"] = wrong; }, "an option: 'default'");
@@ -202,7 +196,8 @@ TEST(Manifest, KindsAreThoseOfADeclaration) {
   expect_refused(kind("name", "a.b"), "kind a.b: a kind's name is lower_case, without a dot");
   expect_refused(kind("apart", "sometimes"), "there is no way to run apart 'sometimes'");
   expect_refused(kind("sees_truth", 1), "'sees_truth' is neither true nor false");
-  expect_refused(kind("more", 1), "a kind has 9 fields, expected 8");
+  expect_refused(kind("is_suite", 1), "'is_suite' is neither true nor false");
+  expect_refused(kind("more", 1), "a kind has 10 fields, expected 9");
   expect_refused([](json& j) { j["kinds"][0]["inputs"][0]["types"] = json::array(); }, "input 'a': has no type");
   expect_refused([](json& j) { j["kinds"][0]["traits"].push_back(j["kinds"][0]["traits"][0]); },
                  "trait 'fast' is named twice");
@@ -307,6 +302,83 @@ TEST(Manifest, MutantsAreRefusedOrConsistent) {
     if (HasFatalFailure()) FAIL() << mutant;
   }
   EXPECT_GT(believed, 50);
+}
+
+// Nodes against the contract of their kind.
+
+using marrow::NodeInfo;
+using marrow::TypeInfo;
+using Faults = std::vector<std::string>;
+
+marrow::KindInfo edges_kind() {
+  marrow::KindInfo kind;
+  kind.name = "edges";
+  kind.inputs = {{"view", "", {TypeInfo::of<marrow::View>()}, ""}};
+  kind.outputs = {{"edges", "", {TypeInfo::of<marrow::EdgeMap>(), TypeInfo::of<marrow::Picture>()}, ""}};
+  kind.traits = {{"thin", "one pixel wide"}};
+  return kind;
+}
+
+template <class In, class Out>
+NodeInfo node(const std::string& in, const std::string& out) {
+  NodeInfo info;
+  info.name = "edges.mine";
+  info.inputs = {{in, "", TypeInfo::of<In>(), false, ""}};
+  info.outputs = {{out, "", TypeInfo::of<Out>(), false, ""}};
+  return info;
+}
+
+Faults faults(const NodeInfo& info) {
+  const marrow::KindInfo kind = edges_kind();
+  return contract_faults(info, &kind);
+}
+
+TEST(Contract, WhatTheKindSaysAndOtherTypes) {
+  EXPECT_EQ(faults(node<marrow::View, marrow::EdgeMap>("view", "edges")), Faults{});
+  EXPECT_EQ(faults(node<marrow::View, marrow::Picture>("view", "edges")), Faults{}) << "the other of its two types";
+  EXPECT_EQ(faults(node<marrow::Volume, marrow::EdgeMap>("view", "edges")),
+            Faults{"input 'view': the kind 'edges' has it as view, not volume"});
+  EXPECT_EQ(faults(node<marrow::View, marrow::Volume>("view", "edges")),
+            Faults{"output 'edges': the kind 'edges' has it as edge_map or picture, not volume"});
+  NodeInfo list = node<marrow::View, marrow::EdgeMap>("view", "edges");
+  list.inputs[0].axis = "view";
+  EXPECT_EQ(faults(list), Faults{"input 'view': the kind 'edges' has it as view, not list of view over view"});
+}
+
+TEST(Contract, AnotherVersionOfATypeOrAMissingOutput) {
+  NodeInfo old = node<marrow::View, marrow::EdgeMap>("view", "edges");
+  ++old.inputs[0].type.version;
+  EXPECT_EQ(
+      faults(old),
+      Faults{"input 'view': the kind 'edges' has it as view, not another version of that type; build both again"});
+  EXPECT_EQ(faults(node<marrow::View, marrow::EdgeMap>("view", "map")),
+            Faults{"output 'edges' is missing: every node of the kind 'edges' has it"});
+}
+
+TEST(Contract, FurtherPortsAreAllowed) {
+  NodeInfo info = node<marrow::View, marrow::EdgeMap>("view", "edges");
+  info.inputs.push_back({"mask", "", TypeInfo::of<marrow::Image>(), false, ""});
+  info.outputs.push_back({"strength", "", TypeInfo::of<marrow::Image>(), false, ""});
+  EXPECT_EQ(faults(info), Faults{});
+}
+
+TEST(Contract, TraitsAreThoseOfTheKind) {
+  NodeInfo info = node<marrow::View, marrow::EdgeMap>("view", "edges");
+  info.traits = {"thin"};
+  EXPECT_EQ(faults(info), Faults{});
+  info.traits = {"thick"};
+  EXPECT_EQ(faults(info), Faults{"trait 'thick': the kind 'edges' has none of that name; did you mean 'thin'?"});
+}
+
+TEST(Contract, OnlySomeKindsSeeTheTruthAndWithoutAKindPortsAreFree) {
+  const NodeInfo info = node<marrow::Truth, marrow::EdgeMap>("truth", "edges");
+  const Faults refused{"input 'truth': only nodes of a kind that may see the truth are given it"};
+  marrow::KindInfo kind = edges_kind();
+  EXPECT_EQ(contract_faults(info, &kind), refused);
+  EXPECT_EQ(contract_faults(info, nullptr), refused) << "no library brings the kind";
+  kind.sees_truth = true;
+  EXPECT_EQ(contract_faults(info, &kind), Faults{});
+  EXPECT_EQ(contract_faults(node<marrow::Volume, marrow::Volume>("a", "b"), nullptr), Faults{});
 }
 
 }  // namespace manifest_test

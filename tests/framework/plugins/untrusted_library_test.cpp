@@ -3,24 +3,19 @@
 // put there.
 #include <pwd.h>
 #include <sys/socket.h>
-#include <sys/stat.h>
 #include <sys/un.h>
 #include <sys/xattr.h>
 #include <unistd.h>
 
-#include <atomic>
-#include <chrono>
 #include <thread>
 
-#include "marrow/base/regular_file.hpp"
+#include "marrow/runtime/plugins/linked_libraries.hpp"
 #include "marrow/runtime/plugins/trust.hpp"
 #include "tests/framework/plugins/library_fixture.hpp"
-#include "tests/harness/message_of.hpp"
 
 namespace untrusted_library_test {
 
 namespace fs = std::filesystem;
-using marrow::test::message_of;
 constexpr uid_t kSomebody = 54321;
 
 class UntrustedLibraryTest : public library_fixture::LibraryTest {
@@ -31,8 +26,7 @@ class UntrustedLibraryTest : public library_fixture::LibraryTest {
   void expect_untrusted(const fs::path& file, const std::string& reason) {
     expect_refused(file, reason);
     const marrow::Catalogue catalogue({file.parent_path()});
-    EXPECT_NE(catalogue.libraries().at(0).refused.find(reason), std::string::npos)
-        << catalogue.libraries().at(0).refused;
+    EXPECT_HAS(catalogue.libraries().at(0).refused, reason) << catalogue.libraries().at(0).refused;
     EXPECT_TRUE(catalogue.node_names().empty());
   }
   void expect_trusted(const fs::path& file) { EXPECT_EQ(marrow::describe_library(file).refused, ""); }
@@ -143,7 +137,7 @@ TEST_F(UntrustedLibraryTest, ThePrivateGroupOfTheUserMayWrite) {
   ASSERT_EQ(setegid(kSomebody), 0);  // as after newgrp: a group that is used for once is no private one
   const std::string fault = marrow::changeable_by_others(file);
   ASSERT_EQ(setegid(0), 0);
-  EXPECT_NE(fault.find("others may write to '" + folder.string() + "'"), std::string::npos) << fault;
+  EXPECT_HAS(fault, "others may write to '" + folder.string() + "'") << fault;
 }
 TEST_F(UntrustedLibraryTest, TheGroupOfAUserWithoutANameMayWrite) {
   if (geteuid() != 0) GTEST_SKIP() << "only root can be somebody else";
@@ -160,8 +154,7 @@ TEST_F(UntrustedLibraryTest, TheGroupOfAUserWithoutANameMayWrite) {
   EXPECT_EQ(fault_as(kSomebody), "");
   ASSERT_EQ(chown(folder.c_str(), kSomebody, kSomebody + 1), 0);
   EXPECT_EQ(fault_as(kSomebody + 1), "");
-  EXPECT_NE(fault_as(kSomebody).find("others may write to '" + folder.string() + "' (owner user 54321, mode 0775)"),
-            std::string::npos);
+  EXPECT_HAS(fault_as(kSomebody), "others may write to '" + folder.string() + "' (owner user 54321, mode 0775)");
 }
 TEST_F(UntrustedLibraryTest, AnAccessListIsNoPrivateGroup) {
   // With a list, the mode shows as the group's what the list gives anyone at most.
@@ -259,7 +252,7 @@ TEST_F(UntrustedLibraryTest, FileThatShrinksWhileItIsHashed) {
   // By the clock: while the writer is kept from the processor, the file stays small and is hashed in no time.
   const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(120);
   while (refused < 20 && std::chrono::steady_clock::now() < end) {
-    const std::string said = message_of([&] { marrow::file_digest(file); });
+    const std::string said = MESSAGE_OF(marrow::file_digest(file));
     if (said.empty()) continue;
     ++refused;
     EXPECT_EQ(said, file.string() + " was changed while it was read; try again when nothing writes to it");
@@ -276,6 +269,77 @@ TEST_F(UntrustedLibraryTest, DigestIsOfTheWholeFile) {
     EXPECT_EQ(marrow::file_digest(scratch.write("whole", text)), marrow::hash_of_bytes(text.data(), text.size()));
   }
   EXPECT_THROW(marrow::file_digest(scratch.path), marrow::Error);
+}
+
+// A plugin of the user's own that links a library in a folder into which others may write.
+
+class UntrustedLinksTest : public library_fixture::LibraryTest {
+ protected:
+  UntrustedLinksTest() {
+    environment.set("MARROW_TRUST_ALL_PLUGINS", std::nullopt);
+    environment.set("MARROW_TEST_MARK", mark.string());
+    const fs::path built = fs::path(MARROW_BINARY_DIR) / "tests" / "linked_plugins";
+    fs::create_directories(libraries);
+    fs::copy_file(built / "linked.so", file);
+    fs::copy_file(built / "libs3" / "libtest_base.so", libraries / "libtest_base.so");
+  }
+  std::string expected() const {
+    return "cannot be loaded, because it needs '" + fs::canonical(libraries / "libtest_base.so").string() +
+           "', which is not trusted, because others may write to '" + fs::canonical(libraries).string() + "' (owner " +
+           getpwuid(geteuid())->pw_name + ", mode 0777); chmod go-w '" + fs::canonical(libraries).string() +
+           "', or set MARROW_TRUST_ALL_PLUGINS=1";
+  }
+
+  runtime_fixture::Environment environment;
+  const fs::path mark = scratch.path / "mark", plugins = scratch.path / "plugins", libraries = plugins / "libs",
+                 file = plugins / "linked.so";
+};
+
+TEST_F(UntrustedLinksTest, TheyAreKnownBeforeTheyAreLoaded) {
+  const std::vector<fs::path> found = marrow::libraries_to_load(file);
+  EXPECT_NE(std::find(found.begin(), found.end(), libraries / "libtest_base.so"), found.end());
+  EXPECT_FALSE(fs::exists(mark)) << "nothing of them has run";
+}
+
+TEST_F(UntrustedLinksTest, TheyAreRefusedBeforeTheyRun) {
+  fs::permissions(libraries, fs::perms(0777));
+  EXPECT_EQ(marrow::describe_library(file).refused, expected());
+  const marrow::Catalogue catalogue({plugins});
+  EXPECT_EQ(catalogue.libraries().at(0).refused, expected());
+  EXPECT_FALSE(fs::exists(mark));
+  fs::permissions(libraries, fs::perms(0755));  // as advised
+  EXPECT_EQ(marrow::Catalogue({plugins}).libraries().at(0).refused, "");
+  EXPECT_TRUE(fs::exists(mark)) << "what others cannot change is loaded";
+}
+
+TEST_F(UntrustedLinksTest, ADescriptionDoesNotMakeThemTrusted) {
+  const marrow::LibraryInfo described = marrow::library_info(file, framework);
+  ASSERT_EQ(described.refused, "");
+  fs::remove(mark);
+  fs::permissions(libraries, fs::perms(0777));
+  EXPECT_EQ(marrow::Catalogue({plugins}).libraries().at(0).refused, expected());
+  EXPECT_EQ(marrow::test::message_of([&] { marrow::load_library(described); }), file.string() + " " + expected());
+  EXPECT_FALSE(fs::exists(mark));
+  environment.set("MARROW_TRUST_ALL_PLUGINS", "1");
+  EXPECT_EQ(marrow::Catalogue({plugins}).libraries().at(0).refused, "");
+}
+
+TEST_F(UntrustedLinksTest, TheOwnerCountsToo) {
+  if (geteuid() != 0) GTEST_SKIP() << "only root can give files away";
+  const fs::path library = libraries / "libtest_base.so";
+  ASSERT_EQ(chown(library.c_str(), kSomebody, kSomebody), 0);
+  fs::permissions(library, fs::perms(0755));
+  EXPECT_EQ(marrow::untrusted_among({library}),
+            "cannot be loaded, because it needs '" + library.string() + "', which is not trusted, because '" +
+                fs::canonical(library).string() +
+                "' belongs to user 54321 (mode 0755), who is neither you nor root; copy it into a folder of your own, "
+                "or set MARROW_TRUST_ALL_PLUGINS=1");
+  EXPECT_EQ(marrow::untrusted_among({library}, kSomebody), "")
+      << "who owns the interpreter is trusted with its modules";
+}
+
+TEST_F(UntrustedLinksTest, WhatTheSystemHasIsTrusted) {
+  EXPECT_EQ(marrow::untrusted_among(marrow::libraries_to_load(marrow::framework_file())), "");
 }
 
 }  // namespace untrusted_library_test

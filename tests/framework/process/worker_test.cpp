@@ -1,14 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "marrow/runtime/process/worker.hpp"
 
-#include <gtest/gtest.h>
 #include <signal.h>
 #include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include <atomic>
-#include <chrono>
 #include <fstream>
 #include <thread>
 

@@ -5,7 +5,6 @@
 #include <signal.h>
 #include <unistd.h>
 
-#include <chrono>
 #include <thread>
 
 #include "marrow/runtime/process/worker.hpp"
@@ -64,16 +63,10 @@ TEST_F(ApartTest, CrashIsOneNodesErrorThatNamesTheFile) {
             "the file is damaged, or of a kind that its reader cannot take: copy or export it again");
   EXPECT_NE(failure("abort").find("(Aborted)"), std::string::npos);
   EXPECT_EQ(failure("names").substr(0, 7), "/inner:");
-}
-
-TEST_F(ApartTest, ProcessThatWasKilledFromOutsideIsNoFaultOfTheFile) {
   EXPECT_EQ(failure("killed"),
             ": it was not read to its end: the process that read it was killed from outside (SIGKILL), as by a system "
             "whose memory, or that of a cluster's job, runs out; run it again, with more memory or fewer threads; "
             "nothing is known against the file");
-}
-
-TEST_F(ApartTest, ReadersAndWhatTheyStartFindNothingOnTheStandardInput) {
   EXPECT_EQ(value(read_word("listen"), 2), 11);
 }
 

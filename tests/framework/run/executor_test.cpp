@@ -1,19 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <sys/mman.h>
 
-#include <atomic>
-#include <utility>
-
+#include "marrow/runtime/run/output_faults.hpp"
 #include "marrow/runtime/run/run_folder.hpp"
 #include "tests/framework/run_fixture.hpp"
-#include "tests/harness/message_of.hpp"
 
 namespace executor_test {
 
-using marrow::NodeRecord;
-using marrow::RunEvent;
-using marrow::RunResult;
-using marrow::test::message_of;
+using namespace marrow;
+using test::message_of;
 using Status = NodeRecord::Status;
 
 class ExecutorTest : public run_fixture::RunTest {
@@ -38,15 +33,15 @@ TEST_F(ExecutorTest, MapsOverListsInStepAndNested) {
       run("  s: {uses: test.sides}\n  l: {uses: test.letters}\n  step: {uses: test.add, in: {a: s.both, b: s.both}}\n"
           "  nest: {uses: test.add, in: {a: s.both, b: l}}\n  sum: {uses: test.sum, in: {items: nest}}\n",
           "step: step, nest: nest, sum: sum");
-  const marrow::Value step = output(result, 0);
+  const Value step = output(result, 0);
   ASSERT_EQ(step.names, (std::vector<std::string>{"a", "b"}));
-  EXPECT_EQ(step.type, marrow::TypeInfo::of<marrow::Metrics>());
+  EXPECT_EQ(step.type, TypeInfo::of<Metrics>());
   EXPECT_EQ(number_of(step.items[1]), 40);
-  const marrow::Value nest = output(result, 1);
+  const Value nest = output(result, 1);
   ASSERT_EQ(nest.axis, "side");
   ASSERT_EQ(nest.items[0].axis, "letter");
   EXPECT_EQ(number_of(nest.items[1].items[2]), 320);
-  const marrow::Value sum = output(result, 2);
+  const Value sum = output(result, 2);
   ASSERT_EQ(sum.axis, "letter");
   EXPECT_EQ(number_of(sum.items[0]), 10 + 100 + 20 + 100);
 }
@@ -56,8 +51,7 @@ TEST_F(ExecutorTest, PicksOneItemByName) {
   const RunResult result = run(
       "  s: {uses: test.sides, with: {names: [left, right]}}\n  a: {uses: test.add, in: {a: s.both.rigth}}\n", "o: a");
   EXPECT_TRUE(result.failed());
-  EXPECT_NE(event_text(RunEvent::Kind::failed).find("there is no 'rigth' along the axis 'side'; did you mean 'right'?"),
-            std::string::npos)
+  EXPECT_HAS(event_text(RunEvent::Kind::failed), "there is no 'rigth' along the axis 'side'; did you mean 'right'?")
       << event_text(RunEvent::Kind::failed);
 }
 
@@ -78,9 +72,8 @@ TEST_F(ExecutorTest, ListsOutOfStepAreAFault) {
           "s.both, b: t.both}}\n",
           "o: a");
   EXPECT_TRUE(result.failed());
-  EXPECT_NE(event_text(RunEvent::Kind::failed)
-                .find("inputs 'a' and 'b' do not go in step along 'side': the first has (a, b), the second (a, c)"),
-            std::string::npos)
+  EXPECT_HAS(event_text(RunEvent::Kind::failed),
+             "inputs 'a' and 'b' do not go in step along 'side': the first has (a, b), the second (a, c)")
       << event_text(RunEvent::Kind::failed);
 }
 
@@ -94,7 +87,7 @@ TEST_F(ExecutorTest, FailureNamesNodeInputsAndReasonAndLeavesOthersGoing) {
   EXPECT_EQ(
       event_text(RunEvent::Kind::failed),
       "node 'f' (test.fail_above) for b failed: the number is too large; give a smaller one (its inputs: a = s.both)");
-  const marrow::Value g = output(result, 0);
+  const Value g = output(result, 0);
   EXPECT_EQ(number_of(g.items[0]), 10) << "the item that did not fail goes on";
   EXPECT_EQ(g.items[1].missing, "node 'f' failed");
   EXPECT_EQ(result.nodes[3].status, Status::not_run);
@@ -112,8 +105,8 @@ TEST_F(ExecutorTest, WhatIsBehindAFailureNamesItsFirstCauseAndIsCounted) {
     EXPECT_TRUE(result.nodes[std::size_t(node)].was_stopped());
     EXPECT_EQ(result.nodes[std::size_t(node)].reason, "node 'f' failed");
   }
-  EXPECT_EQ(marrow::not_run_text(3), "3 nodes were not run because of it");
-  EXPECT_EQ(marrow::not_run_text(1), "1 node was not run because of it");
+  EXPECT_EQ(not_run_text(3), "3 nodes were not run because of it");
+  EXPECT_EQ(not_run_text(1), "1 node was not run because of it");
 }
 
 TEST_F(ExecutorTest, WhatIsNotThereIsSkippedAndNoFailure) {
@@ -146,8 +139,7 @@ TEST_F(ExecutorTest, GivenValuesAreNotComputedAgain) {
 
 TEST_F(ExecutorTest, GivenValuesWithoutKeysAreToldApartByContent) {
   const auto made = [](double value) {
-    return marrow::Value::of<marrow::Metrics>(
-        std::make_shared<const marrow::Metrics>(marrow::Metrics{{{"value", value, ""}}}));
+    return Value::of<Metrics>(std::make_shared<const Metrics>(Metrics{{{"value", value, ""}}}));
   };
   settings.given["c"] = {made(1)};
   settings.given["d"] = {made(2)};
@@ -170,7 +162,7 @@ TEST_F(ExecutorTest, SameRecipeIsComputedOnce) {
 
 TEST_F(ExecutorTest, KeysFollowContentNotRecipe) {
   const RunResult first = run("  c: {uses: test.constant, with: {value: 3}}\n", "o: c");
-  const marrow::Digest key = output(first).key;
+  const Digest key = output(first).key;
   EXPECT_EQ(
       key,
       output(run("  z: {uses: test.add, in: {a: y}}\n  y: {uses: test.constant, with: {value: 3}}\n", "o: z")).key);
@@ -195,9 +187,9 @@ TEST_F(ExecutorTest, FunctionKeepsItsInputsAlive) {
           "test.apply, in: {adder: f, to: c}}\n",
           "a: a, f: f");
   EXPECT_EQ(result_of(result), 10);
-  const marrow::Value function = output(result, 1);
+  const Value function = output(result, 1);
   EXPECT_EQ(function.type.content, nullptr) << "a function has no content";
-  EXPECT_NE(function.key, marrow::Digest{});
+  EXPECT_NE(function.key, Digest{});
 }
 
 TEST_F(ExecutorTest, SeedDecidesRandomNodesAlone) {
@@ -251,16 +243,74 @@ TEST_F(ExecutorTest, CancelStopsWithinANode) {
 TEST_F(ExecutorTest, RunFolderRefusesToOverwrite) {
   run("  c: {uses: test.constant}\n", "o: c");
   scratch.write("something", "here");
-  const std::string said = message_of([&] { marrow::RunFolder folder(scratch.path, pipeline); });
-  EXPECT_NE(said.find("is already there and not empty; choose another with --out"), std::string::npos) << said;
+  const std::string said = message_of([&] { RunFolder folder(scratch.path, pipeline); });
+  EXPECT_HAS(said, "is already there and not empty; choose another with --out") << said;
   EXPECT_TRUE(std::filesystem::exists(scratch.path / "something"));
 }
 
 TEST_F(ExecutorTest, RunFolderThatCannotBeMade) {
   run("  c: {uses: test.constant}\n", "o: c");
   scratch.write("file", "");
-  const std::string said = message_of([&] { marrow::RunFolder folder(scratch.path / "file" / "below", pipeline); });
-  EXPECT_NE(said.find("cannot make the output folder"), std::string::npos) << said;
+  const std::string said = message_of([&] { RunFolder folder(scratch.path / "file" / "below", pipeline); });
+  EXPECT_HAS(said, "cannot make the output folder") << said;
+}
+
+// The names of figures that a node declares: the declaration, the manifest, and a node that makes another figure.
+
+const Catalogue& catalogue() {
+  static const Catalogue figures({std::filesystem::path(MARROW_BINARY_DIR) / "tests" / "plugins",
+                                  std::filesystem::path(MARROW_BINARY_DIR) / "tests" / "figure_plugins"});
+  return figures;
+}
+
+TEST(FigureNames, AreInTheManifestAndAStarStandsForAnyText) {
+  const NodeInfo* declared = catalogue().find("test.declared");
+  ASSERT_TRUE(declared);
+  EXPECT_EQ(declared->outputs[0].figures, (std::vector<std::string>{"mtre_mm", "*.median_px"}));
+  EXPECT_TRUE(catalogue().find("test.undeclared")->outputs[0].figures.empty());
+  PortInfo port;
+  EXPECT_TRUE(may_have_figure(port, "anything")) << "nothing is known";
+  port.figures = {"mtre_mm", "*.median_px", "median_*", "a*b*c"};
+  for (const char* name : {"mtre_mm", "frontal.median_px", ".median_px", "a.b.median_px", "median_", "median_mtre_mm",
+                           "abc", "a--b--c", "abbc"})
+    EXPECT_TRUE(may_have_figure(port, name)) << name;
+  for (const char* name : {"", "mtre_m", "mtre_mm2", "median.px", "frontal.median_pxx", "ab", "acb", "xabc"})
+    EXPECT_FALSE(may_have_figure(port, name)) << name;
+}
+
+class FiguresOfARun : public run_fixture::RunTest {
+ protected:
+  const Catalogue& catalogue() const override { return executor_test::catalogue(); }
+  RunResult run_also(const std::string& node, const std::string& also) {
+    return run("  c: {uses: test.constant}\n  n: {uses: " + node + ", in: {of: c}, with: {also: " + also + "}}\n",
+               "figures: n");
+  }
+};
+
+TEST_F(FiguresOfARun, MustBeAmongTheDeclared) {
+  const RunResult other = run_also("test.declared", "odd_mm");
+  EXPECT_TRUE(other.failed());
+  EXPECT_EQ(other.nodes.back().reason,
+            "it gave an output 'metrics' that cannot be: the figure 'odd_mm' is not among those that its declaration "
+            "names");
+  EXPECT_FALSE(run_also("test.declared", "lateral.median_px").failed());
+  EXPECT_FALSE(run_also("test.undeclared", "odd_mm").failed());
+}
+
+Metrics figures() { return {}; }
+Pose pose() { return {}; }
+std::vector<std::string> faults(const Plugin& plugin) { return plugin.nodes.back().faults; }
+
+TEST(FigureNames, BelongToAnOutputOfFigures) {
+  Plugin plugin;
+  plugin.node("test.figures", figures).summary("s").out("metrics", "h").figures({"a", "b"});
+  EXPECT_TRUE(faults(plugin).empty());
+  EXPECT_EQ(plugin.nodes.back().info.outputs[0].figures, (std::vector<std::string>{"a", "b"}));
+  plugin.node("test.pose", pose).summary("s").out("pose", "h").figures({"a"});
+  EXPECT_EQ(faults(plugin),
+            (std::vector<std::string>{"output 'pose': .figures() is for an output of figures, which are Metrics"}));
+  plugin.node("test.early", figures).summary("s").figures({"a"}).out("metrics", "h");
+  EXPECT_EQ(faults(plugin), (std::vector<std::string>{".figures() belongs after an .out()"}));
 }
 
 }  // namespace executor_test

@@ -2,19 +2,11 @@
 // Nodes that throw anything, lie about sizes, or change what all nodes of the process share: they fail, and the others
 // give what they give without them. What is right is known from a run without the hostile node, and from IEEE 754 and
 // the C library for the state itself.
-#include <fenv.h>
-#include <locale.h>
-#include <signal.h>
 
-#include <limits>
-#include <opencv2/core.hpp>
-#include <optional>
 #include <thread>
 
 #include "marrow/base/process_state.hpp"
-#include "marrow/runtime/store/store.hpp"
 #include "tests/framework/run_fixture.hpp"
-#include "tests/harness/message_of.hpp"
 
 namespace hostile_nodes_test {
 

@@ -3,33 +3,24 @@
 #include "marrow/runtime/run/keys.hpp"
 
 #include <fcntl.h>
-#include <gtest/gtest.h>
 #include <linux/magic.h>
 #include <sys/mman.h>
 #include <sys/vfs.h>
 #include <unistd.h>
 
-#include <cstdlib>
-#include <filesystem>
-#include <fstream>
-#include <set>
 #include <thread>
 
-#include "marrow/runtime/node/mapping.hpp"
+#include "marrow/runtime/run/node_calls.hpp"
+#include "tests/framework/fixture.hpp"
 
 namespace keys_test {
 
+using namespace marrow;
 namespace fs = std::filesystem;
-using marrow::Digest;
-using marrow::OptionType;
-using marrow::Provenance;
-using marrow::Value;
 
 class Keys : public testing::Test {
  protected:
   Keys() {
-    std::string folder = (fs::temp_directory_path() / "marrow-keys-XXXXXX").string();
-    folder_ = mkdtemp(folder.data());
     node_.info.name = "kind.one";
     add("flag", OptionType::boolean, false);
     add("count", OptionType::integer, std::int64_t(3));
@@ -55,16 +46,14 @@ class Keys : public testing::Test {
     views.items[1].key = {5, 6};
     inputs_ = {image, views};
   }
-  ~Keys() override { fs::remove_all(folder_); }
-
-  void add(const std::string& name, OptionType type, const marrow::OptionValue& value) {
-    marrow::OptionInfo info;
+  void add(const std::string& name, OptionType type, const OptionValue& value) {
+    OptionInfo info;
     info.name = name;
     info.type = type;
     node_.info.options.push_back(info);
     node_.options.push_back(value);
   }
-  marrow::OptionValue& option(const std::string& name) {
+  OptionValue& option(const std::string& name) {
     std::size_t i = 0;
     while (node_.info.options.at(i).name != name) ++i;
     return node_.options[i];
@@ -76,13 +65,14 @@ class Keys : public testing::Test {
   }
   Digest recipe() const { return recipe_of(node_, inputs_); }
 
-  fs::path folder_;
-  marrow::PipelineNode node_;
+  const runtime_fixture::Scratch scratch_;
+  const fs::path& folder_ = scratch_.path;
+  PipelineNode node_;
   std::vector<Value> inputs_;
 };
 
 TEST_F(Keys, EachPartOfARecipeCountsOnItsOwn) {
-  const marrow::PipelineNode node = node_;
+  const PipelineNode node = node_;
   const std::vector<Value> inputs = inputs_;
   std::set<Digest> seen{recipe()};
   EXPECT_EQ(recipe(), *seen.begin()) << "the same each time";
@@ -93,7 +83,7 @@ TEST_F(Keys, EachPartOfARecipeCountsOnItsOwn) {
   };
   node_.info.name = "kind.other";
   is_new("the node");
-  const std::vector<std::pair<std::string, marrow::OptionValue>> others{
+  const std::vector<std::pair<std::string, OptionValue>> others{
       {"flag", true},
       {"count", std::int64_t(4)},
       {"size", std::nextafter(1.5, 2)},
@@ -106,7 +96,7 @@ TEST_F(Keys, EachPartOfARecipeCountsOnItsOwn) {
   for (const auto& [name, value] : others) {
     option(name) = value;
     is_new(name.c_str());
-    for (marrow::OptionInfo& info : node_.info.options)
+    for (OptionInfo& info : node_.info.options)
       if (info.name == name) info.name += "_renamed";
     is_new((name + ", renamed").c_str());
   }
@@ -133,7 +123,7 @@ TEST_F(Keys, FilesBesideTheNamedOneCount) {
   const std::string named = write("networks/bones.yaml", "what it is"), model = write("networks/bones.onnx", "a");
   option("file") = named;
   const Digest without = recipe();
-  for (marrow::OptionInfo& info : node_.info.options)
+  for (OptionInfo& info : node_.info.options)
     if (info.name == "file") info.beside = {".onnx"};
   std::set<Digest> seen{without, recipe()};
   EXPECT_EQ(seen.size(), 2u) << "the file beside it";
@@ -205,17 +195,17 @@ TEST_F(Keys, FilesKnownFromBeforeAreReadAgainWhenTheirSizeOrTimeIsAnother) {
   const fs::path file = write("old", "one");
   const auto day = std::chrono::hours(24);
   fs::last_write_time(file, fs::file_time_type::clock::now() - 2 * day);
-  const Digest one = marrow::path_digest(file);
+  const Digest one = path_digest(file);
   write("old", "two");
   fs::last_write_time(file, fs::file_time_type::clock::now() - day);
-  const Digest two = marrow::path_digest(file);
+  const Digest two = path_digest(file);
   EXPECT_NE(two, one) << "another time";
   const auto time = fs::last_write_time(file);
   write("old", "twenty");
   fs::last_write_time(file, time);
-  EXPECT_NE(marrow::path_digest(file), two) << "another size";
+  EXPECT_NE(path_digest(file), two) << "another size";
   write("old", "two");
-  EXPECT_EQ(marrow::path_digest(file), two);
+  EXPECT_EQ(path_digest(file), two);
 }
 
 TEST_F(Keys, WritesThroughMemoryDoNotPass) {
@@ -237,9 +227,9 @@ TEST_F(Keys, WritesThroughMemoryDoNotPass) {
   write_later('b');
   EXPECT_TRUE(system.f_type == TMPFS_MAGIC || states_of_files(node_) != state) << "a node may be reading it";
   std::this_thread::sleep_for(std::chrono::milliseconds(3100));  // from then on a digest is kept
-  const Digest before = marrow::path_digest(file);
+  const Digest before = path_digest(file);
   write_later('c');
-  EXPECT_NE(marrow::path_digest(file), before);
+  EXPECT_NE(path_digest(file), before);
   munmap(text, 10000);
 }
 
@@ -265,64 +255,62 @@ TEST_F(Keys, FilesInMemoryAreReadEachTime) {
   close(descriptor);
   ASSERT_NE(static_cast<void*>(text), MAP_FAILED);
   std::this_thread::sleep_for(std::chrono::milliseconds(3100));  // elsewhere a digest is kept from then on
-  const Digest before = marrow::path_digest(file);
+  const Digest before = path_digest(file);
   text[50] = 'a';  // gives the file no new time
-  EXPECT_NE(marrow::path_digest(file), before);
+  EXPECT_NE(path_digest(file), before);
   munmap(text, 100);
   fs::remove(file);
 }
 
 TEST_F(Keys, OfResults) {
   const Digest recipe{1, 2}, build{3, 4};
-  const Digest key = marrow::result_key(recipe, build, false, 1);
-  EXPECT_EQ(marrow::result_key(recipe, build, false, 2), key) << "the seed is none of what is not random";
-  EXPECT_NE(marrow::result_key({1, 3}, build, false, 1), key);
-  EXPECT_NE(marrow::result_key(recipe, {3, 5}, false, 1), key) << "the build id";
-  EXPECT_NE(marrow::result_key(recipe, {4, 4}, false, 1), key) << "the other half of the build id";
-  EXPECT_NE(marrow::result_key(recipe, build, true, 1), marrow::result_key(recipe, build, true, 2));
+  const Digest key = result_key(recipe, build, false, 1);
+  EXPECT_EQ(result_key(recipe, build, false, 2), key) << "the seed is none of what is not random";
+  EXPECT_NE(result_key({1, 3}, build, false, 1), key);
+  EXPECT_NE(result_key(recipe, {3, 5}, false, 1), key) << "the build id";
+  EXPECT_NE(result_key(recipe, {4, 4}, false, 1), key) << "the other half of the build id";
+  EXPECT_NE(result_key(recipe, build, true, 1), result_key(recipe, build, true, 2));
   for (const char* variable : {"OPENCV_CPU_DISABLE", "OPENCV_IPP", "GLIBC_TUNABLES"}) {
     setenv(variable, "glibc.malloc.hugetlb=1:glibc.cpu.hwcaps=-AVX2", 1);
-    EXPECT_NE(marrow::result_key(recipe, build, false, 1), key) << variable;
+    EXPECT_NE(result_key(recipe, build, false, 1), key) << variable;
     unsetenv(variable);
   }
   setenv("OPENCV_LOG_LEVEL", "INFO", 1);
   setenv("GLIBC_TUNABLES", "glibc.malloc.hugetlb=1", 1);
-  EXPECT_EQ(marrow::result_key(recipe, build, false, 1), key)
-      << "what is printed, and where memory comes from, are none of it";
+  EXPECT_EQ(result_key(recipe, build, false, 1), key) << "what is printed, and where memory comes from, are none of it";
   unsetenv("OPENCV_LOG_LEVEL");
   unsetenv("GLIBC_TUNABLES");
-  EXPECT_NE(marrow::function_key(key, 0), marrow::function_key(key, 1));
-  EXPECT_NE(marrow::function_key(key, 0), marrow::function_key(recipe, 0));
-  EXPECT_NE(marrow::seed_of(recipe, 1), marrow::seed_of(recipe, 2));
-  EXPECT_NE(marrow::seed_of(recipe, 1), marrow::seed_of(build, 1));
+  EXPECT_NE(function_key(key, 0), function_key(key, 1));
+  EXPECT_NE(function_key(key, 0), function_key(recipe, 0));
+  EXPECT_NE(seed_of(recipe, 1), seed_of(recipe, 2));
+  EXPECT_NE(seed_of(recipe, 1), seed_of(build, 1));
 }
 
 TEST_F(Keys, OptionsInWords) {
-  EXPECT_EQ(marrow::text_of(true, OptionType::boolean), "true");
-  EXPECT_EQ(marrow::text_of(false, OptionType::boolean), "false");
-  EXPECT_EQ(marrow::text_of(std::int64_t(-7), OptionType::integer), "-7");
-  EXPECT_EQ(marrow::text_of(0.1, OptionType::number), "0.10000000000000001") << "all that counts for the key";
-  EXPECT_EQ(marrow::text_of(std::string("word"), OptionType::text), "word");
-  EXPECT_EQ(marrow::text_of(std::vector<double>{1, 2.5}, OptionType::numbers), "[1, 2.5]");
-  EXPECT_EQ(marrow::text_of(std::vector<std::string>{"a", "b"}, OptionType::texts), "[a, b]");
-  EXPECT_EQ(marrow::text_of(std::vector<std::string>{}, OptionType::texts), "[]");
+  EXPECT_EQ(text_of(true, OptionType::boolean), "true");
+  EXPECT_EQ(text_of(false, OptionType::boolean), "false");
+  EXPECT_EQ(text_of(std::int64_t(-7), OptionType::integer), "-7");
+  EXPECT_EQ(text_of(0.1, OptionType::number), "0.10000000000000001") << "all that counts for the key";
+  EXPECT_EQ(text_of(std::string("word"), OptionType::text), "word");
+  EXPECT_EQ(text_of(std::vector<double>{1, 2.5}, OptionType::numbers), "[1, 2.5]");
+  EXPECT_EQ(text_of(std::vector<std::string>{"a", "b"}, OptionType::texts), "[a, b]");
+  EXPECT_EQ(text_of(std::vector<std::string>{}, OptionType::texts), "[]");
   const std::string file = write("file", "content"),
-                    content = " (content " + marrow::path_digest(file).hex().substr(0, 8) + ")";
-  EXPECT_EQ(marrow::text_of(file, OptionType::path), file + content);
-  EXPECT_EQ(marrow::text_of(std::vector<std::string>{file, file}, OptionType::paths),
+                    content = " (content " + path_digest(file).hex().substr(0, 8) + ")";
+  EXPECT_EQ(text_of(file, OptionType::path), file + content);
+  EXPECT_EQ(text_of(std::vector<std::string>{file, file}, OptionType::paths),
             "[" + file + content + ", " + file + content + "]");
 }
 
 TEST_F(Keys, KeptWarningsNameTheFileThatIsReadNow) {
   Provenance kept;
   for (std::size_t i = 0; i < node_.options.size(); ++i)
-    kept.options[node_.info.options[i].name] = marrow::text_of(node_.options[i], node_.info.options[i].type);
+    kept.options[node_.info.options[i].name] = text_of(node_.options[i], node_.info.options[i].type);
   const std::string before = std::get<std::string>(option("file")), now = write("elsewhere/file", "content");
   option("file") = now;
-  EXPECT_EQ(marrow::warning_now(before + ": it has holes; " + before, node_, kept), now + ": it has holes; " + now);
-  EXPECT_EQ(marrow::warning_now("holes", node_, kept), "holes");
-  EXPECT_EQ(marrow::warning_now(before + ": it has holes", node_, {}), before + ": it has holes")
-      << "nothing is known of it";
+  EXPECT_EQ(warning_now(before + ": it has holes; " + before, node_, kept), now + ": it has holes; " + now);
+  EXPECT_EQ(warning_now("holes", node_, kept), "holes");
+  EXPECT_EQ(warning_now(before + ": it has holes", node_, {}), before + ": it has holes") << "nothing is known of it";
 }
 
 TEST_F(Keys, WhatMadeADifference) {
@@ -335,22 +323,22 @@ TEST_F(Keys, WhatMadeADifference) {
   Provenance now = before;
   now.seed = 2;
   now.seconds = 9;
-  EXPECT_EQ(marrow::difference(before, now), "") << "it is not random";
+  EXPECT_EQ(difference(before, now), "") << "it is not random";
   now.random = true;
-  EXPECT_EQ(marrow::difference(before, now), "the seed is 2, was 1");
+  EXPECT_EQ(difference(before, now), "the seed is 2, was 1");
   now.seed = 1;
-  EXPECT_EQ(marrow::difference(before, now), "");
+  EXPECT_EQ(difference(before, now), "");
   now.build_id = {1, 2};
-  EXPECT_EQ(marrow::difference(before, now), "the plugin of edges.canny was rebuilt");
+  EXPECT_EQ(difference(before, now), "the plugin of edges.canny was rebuilt");
   now.options["high"] = "80";
   now.options["blur"] = "1";
   now.inputs["image"] = {3, 3};
   now.inputs["region"] = {};
-  EXPECT_EQ(marrow::difference(before, now),
+  EXPECT_EQ(difference(before, now),
             "the plugin of edges.canny was rebuilt; option 'blur' is 1, was not there; option 'high' is 80, was 75; "
             "input 'image' changed; input 'region' changed");
   now.node = "edges.gradient_mask";
-  EXPECT_EQ(marrow::difference(before, now),
+  EXPECT_EQ(difference(before, now),
             "it uses edges.gradient_mask, used edges.canny; input 'image' changed; input 'region' changed");
 }
 

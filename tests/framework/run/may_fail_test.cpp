@@ -6,11 +6,7 @@
 
 namespace may_fail_test {
 
-using marrow::LogLevel;
-using marrow::NodeRecord;
-using marrow::PlannedNode;
-using marrow::RunEvent;
-using marrow::RunResult;
+using namespace marrow;
 using Status = NodeRecord::Status;
 using What = PlannedNode::What;
 
@@ -44,14 +40,14 @@ TEST_F(MayFailTest, TheRunGoesOnAndAnInputThatIsNotNeededIsLeftOut) {
   EXPECT_EQ(result_of(result), 5) << "without what would be added";
   const NodeRecord& failed = record(result, "f");
   EXPECT_EQ(failed.status, Status::failed_alone);
-  EXPECT_STREQ(marrow::status_name(failed.status), "failed alone");
+  EXPECT_STREQ(status_name(failed.status), "failed alone");
   EXPECT_EQ(failed.reason, "the number is too large; give a smaller one");
   EXPECT_EQ(failed.stopped, 0);
   EXPECT_EQ(failures, (std::map<std::string, LogLevel>{
                           {"node 'f' (test.fail_above) failed: the number is too large; give a smaller one (its "
                            "inputs: a = c); the run goes on without it",
                            LogLevel::warning}}));
-  const marrow::Value absent = output(result, 1);
+  const Value absent = output(result, 1);
   EXPECT_TRUE(absent.is_absent());
   EXPECT_TRUE(absent.may_be_missing);
   EXPECT_EQ(absent.missing, "node 'f' failed");
@@ -257,10 +253,10 @@ TEST_F(MayFailTest, WhatIsCalledForItemsThatNobodyKnowsFails) {
 
 TEST_F(MayFailTest, StoppedCountsMoreThanFailedAlone) {
   const auto status_of = [](const std::vector<Status>& calls) {
-    std::vector<marrow::Call> all(calls.size());
+    std::vector<Call> all(calls.size());
     for (std::size_t i = 0; i < calls.size(); ++i) all[i].result.status = calls[i];
     NodeRecord record;
-    marrow::set_status(all, record);
+    set_status(all, record);
     return record.status;
   };
   EXPECT_EQ(status_of({Status::failed_alone, Status::cancelled}), Status::cancelled);
@@ -293,18 +289,12 @@ TEST_F(MayFailText, WhoNeedsItIsRefused) {
                  "node 'n' needs input 'items', but node 'f' may fail", "may_fail: true");
   expect_refusal(kFailsForB, "  n: {uses: test.sum, in: {items: f}}\n", 28,
                  "node 'n' needs input 'items', but node 'f' may fail", "may_fail: true");
-}
-
-TEST_F(MayFailText, WhoIsCalledForItsItemsAloneIsRefused) {
   expect_refusal(kFailsForB, "  n: {uses: test.add, in: {a: c, b: f}}\n", 34,
                  "node 'n' is called for each side of 'f', but node 'f' may fail",
                  "write  may_fail: true  at node 'n' too");
   read("marrow: 1\nnodes:\n" + kNumbers + kFailsForB + "  n: {uses: test.add, in: {a: s.both, b: f}}\n" +
        "  m: {uses: test.add, in: {a: c, b: f.a}}\noutputs: {n: n, m: m}\n");
   EXPECT_TRUE(diagnostics.empty()) << diagnostics.text();
-}
-
-TEST_F(MayFailText, TheWordIsTrueOrFalse) {
   expect_node_fault("{uses: test.constant, may_fail: perhaps}", 28,
                     "'may_fail' of node 'n': expected true or false, got 'perhaps'");
   expect_node_fault("{uses: test.constant, may_fial: true}", 28, "unknown key 'may_fial'", "did you mean 'may_fail'?");
@@ -313,12 +303,12 @@ TEST_F(MayFailText, TheWordIsTrueOrFalse) {
 TEST_F(MayFailText, ResolvedYamlAndOverrides) {
   const std::string nodes = kNumbers + kFails + "  d: {uses: test.add, in: {a: c, b: f}}\n";
   const std::string text = "marrow: 1\nnodes:\n" + nodes + "outputs: {d: d}\n";
-  const std::string once = marrow::resolved_yaml(read(text));
+  const std::string once = resolved_yaml(read(text));
   EXPECT_NE(once.find("may_fail: true"), std::string::npos) << once;
-  EXPECT_EQ(marrow::resolved_yaml(read(once)), once);
+  EXPECT_EQ(resolved_yaml(read(once)), once);
   ASSERT_TRUE(diagnostics.empty()) << diagnostics.text();
   const auto may_fail = [&](const std::string& key, const std::string& value, std::size_t node) {
-    const marrow::Pipeline pipeline = read(text, {{}, {{key, value}}});
+    const Pipeline pipeline = read(text, {{}, {{key, value}}});
     EXPECT_TRUE(diagnostics.empty()) << diagnostics.text();
     return !pipeline.nodes.empty() && pipeline.nodes[node].may_fail;
   };

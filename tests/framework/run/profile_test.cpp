@@ -6,19 +6,16 @@
 
 #include <nlohmann/json.hpp>
 
-#include "marrow/domain/functions.hpp"
 #include "marrow/runtime/node/types.hpp"
-#include "marrow/runtime/run/profiled_functions.hpp"
+#include "marrow/runtime/run/evaluation.hpp"
 
 namespace profile_test {
 
-using marrow::Optimizer;
-using marrow::Profile;
-using marrow::Value;
+using namespace marrow;
 using nlohmann::json;
 
 /// Tries the start and one step beyond it. Says whether it was given derivatives.
-marrow::MinimisationResult two_tries(const marrow::MinimisationProblem& problem) {
+MinimisationResult two_tries(const MinimisationProblem& problem) {
   const Eigen::VectorXd next = problem.start + problem.initial_step;
   double value = std::min(problem.function(problem.start), problem.function(next));
   if (problem.expansion) value = problem.expansion(next).value;
@@ -31,17 +28,13 @@ struct Extra {
 };
 class Named : public Optimizer {
  public:
-  marrow::MinimisationResult minimise(const marrow::MinimisationProblem& problem) const override {
-    return two_tries(problem);
-  }
+  MinimisationResult minimise(const MinimisationProblem& problem) const override { return two_tries(problem); }
 };
 
 namespace {
 class Hidden : public Optimizer {
  public:
-  marrow::MinimisationResult minimise(const marrow::MinimisationProblem& problem) const override {
-    return two_tries(problem);
-  }
+  MinimisationResult minimise(const MinimisationProblem& problem) const override { return two_tries(problem); }
 };
 class HiddenWithExtra : public Named, public Extra {};
 
@@ -50,8 +43,8 @@ Value value_of() {
   return Value::of<Optimizer>(std::make_shared<Made>());
 }
 
-marrow::MinimisationProblem square() {
-  marrow::MinimisationProblem problem;
+MinimisationProblem square() {
+  MinimisationProblem problem;
   problem.function = [](const Eigen::VectorXd& x) { return (x[0] - 3) * (x[0] - 3); };
   problem.start = Eigen::VectorXd::Zero(1);
   problem.initial_step = Eigen::VectorXd::Constant(1, 2);
@@ -67,15 +60,15 @@ json sum_of(const json& profile, const std::string& what) {
 
 TEST(Profile, NotesTheEvaluationsOfAnOptimizer) {
   Profile profile;
-  const marrow::ProfilePlace place{&profile, "track/", "0007/"};
+  const ProfilePlace place{&profile, "track/", "0007/"};
   Value value = value_of<Hidden>();
   show_calls(value, place, "search", "distal");
-  marrow::MinimisationProblem problem = square();
+  MinimisationProblem problem = square();
   const auto result = value.as<Optimizer>().minimise(problem);
   EXPECT_EQ(result.x[0], 2);
   EXPECT_EQ(result.value, 1);
   EXPECT_EQ(result.stopped_because, "no derivatives");
-  problem.expansion = [](const Eigen::VectorXd&) { return marrow::MinimisationProblem::Expansion{-5, {}, {}}; };
+  problem.expansion = [](const Eigen::VectorXd&) { return MinimisationProblem::Expansion{-5, {}, {}}; };
   EXPECT_EQ(value.as<Optimizer>().minimise(problem).value, -5);
 
   const json made = json::parse(profile.text("p"));
@@ -97,7 +90,7 @@ TEST(Profile, LeavesFunctionsWhoseClassOthersMayKnow) {
 
 TEST(Profile, CountsCallsThatHaveNoBar) {
   Profile profile;
-  const marrow::ProfilePlace place{&profile};
+  const ProfilePlace place{&profile};
   const std::size_t calls = Profile::kMostFunctionBars + 7;
   {
     const Profile::Bar node(place, Profile::Kind::node, "pose");
@@ -116,5 +109,45 @@ TEST(Profile, CountsCallsThatHaveNoBar) {
 }
 
 TEST(Profile, SaysNothingIfAllCallsHaveBars) { EXPECT_EQ(note_on_profile(Profile()), ""); }
+
+// Which kept result a plan compares with. The differences were counted by hand.
+
+Store::Last made(std::uint64_t key, const std::string& low, const std::string& high, std::uint64_t image) {
+  Provenance from;
+  from.node = "edges.canny";
+  from.options = {{"low", low}, {"high", high}};
+  from.inputs = {{"image", Digest{image, 0}}};
+  return {Digest{key, 0}, from};
+}
+
+std::string reason(const std::vector<Store::Last>& kept, const Store::Last& last, const Store::Last& now) {
+  const Provenance* nearest = nearest_result(kept, last, now.provenance);
+  return nearest ? difference(*nearest, now.provenance) : "none";
+}
+
+TEST(NearestResult, TheOneWithFewestDifferences) {
+  const Store::Last first = made(1, "10", "20", 1), last = made(2, "50", "60", 1);
+  EXPECT_EQ(reason({first, last}, last, made(3, "10", "25", 1)), "option 'high' is 25, was 20");
+  EXPECT_EQ(reason({first, last}, last, made(3, "50", "25", 1)), "option 'high' is 25, was 60");
+}
+
+TEST(NearestResult, OfEquallyNearOnesTheLastAndThenTheLatest) {
+  const Store::Last first = made(1, "10", "20", 1), second = made(2, "10", "30", 1), last = made(3, "10", "40", 1);
+  const Store::Last now = made(4, "10", "50", 1);
+  EXPECT_EQ(reason({first, last, second}, last, now), "option 'high' is 50, was 40");
+  EXPECT_EQ(reason({first, second}, last, now), "option 'high' is 50, was 30") << "the last one failed";
+}
+
+TEST(NearestResult, AnInputThatDidNotChangeIsNoReasonNorAreOtherNodes) {
+  const Store::Last own = made(1, "10", "20", 1), of_other_view = made(2, "11", "21", 2);
+  EXPECT_EQ(reason({own, of_other_view}, own, made(3, "11", "21", 1)),
+            "option 'high' is 21, was 20; option 'low' is 11, was 10");
+  EXPECT_EQ(reason({own, of_other_view}, own, made(3, "11", "22", 2)), "option 'high' is 22, was 21")
+      << "the other image is given now";
+  EXPECT_EQ(reason({of_other_view}, own, made(3, "11", "21", 1)), "input 'image' changed") << "there are no others";
+  Store::Last other = made(1, "10", "20", 1);
+  other.provenance.node = "edges.gradient_mask";
+  EXPECT_EQ(reason({other}, other, made(2, "10", "20", 1)), "none");
+}
 
 }  // namespace profile_test

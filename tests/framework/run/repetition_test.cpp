@@ -1,16 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 // Nodes with a body: what the passes are given, what they carry, how they end.
-#include <algorithm>
 
 #include "marrow/runtime/run/run_folder.hpp"
 #include "tests/framework/store/store_fixture.hpp"
 
 namespace repetition_test {
 
-using marrow::Metrics;
-using marrow::NodeRecord;
-using marrow::RunResult;
-using marrow::Value;
+using namespace marrow;
 using Status = NodeRecord::Status;
 
 constexpr const char* kSum = R"(marrow: 1
@@ -35,9 +31,9 @@ class RepetitionTest : public store_fixture::StoreTest {
   static const NodeRecord& of_body(const NodeRecord& record, std::size_t index) { return record.passes->nodes[index]; }
 
   std::string faults(const std::string& nodes, const std::string& outputs = "o: r") {
-    marrow::Diagnostics diagnostics;
-    marrow::read_pipeline(scratch.write("p.yaml", "marrow: 1\nnodes:\n" + nodes + "outputs: {" + outputs + "}\n"), {},
-                          catalogue(), diagnostics);
+    Diagnostics diagnostics;
+    read_pipeline(scratch.write("p.yaml", "marrow: 1\nnodes:\n" + nodes + "outputs: {" + outputs + "}\n"), {},
+                  catalogue(), diagnostics);
     return diagnostics.text();
   }
 };
@@ -76,8 +72,8 @@ TEST_F(RepetitionTest, ASecondRunCallsNothing) {
   EXPECT_EQ(numbers(output(again)), (std::vector<double>{101, 301, 601}));
   EXPECT_EQ(of_body(record(again, "r"), 2).calls, 0);
   EXPECT_EQ(of_body(record(again, "r"), 2).cached, 3);
-  const std::vector<marrow::PlannedNode> planned = plan(kOver, "all: r.sum");
-  EXPECT_EQ(planned[1].what, marrow::PlannedNode::What::cached);
+  const std::vector<PlannedNode> planned = plan(kOver, "all: r.sum");
+  EXPECT_EQ(planned[1].what, PlannedNode::What::cached);
 }
 
 TEST_F(RepetitionTest, OneItemMoreIsOnePassMore) {
@@ -86,7 +82,7 @@ TEST_F(RepetitionTest, OneItemMoreIsOnePassMore) {
            "  r: {repeat: sum.yaml, over: side, in: {item: s.both}, carry: {before: sum}}\n";
   };
   run(nodes("a, b"), "all: r.sum");
-  const std::vector<marrow::PlannedNode> planned = plan(nodes("a, b, c"), "all: r.sum");
+  const std::vector<PlannedNode> planned = plan(nodes("a, b, c"), "all: r.sum");
   const RunResult result = run(nodes("a, b, c"), "all: r.sum");
   EXPECT_EQ(numbers(output(result)), (std::vector<double>{11, 31, 61}));
   EXPECT_EQ(of_body(record(result, "r"), 2).calls, 1);
@@ -204,20 +200,18 @@ TEST_F(RepetitionTest, OnePassMayHoldALoop) {
 }
 
 TEST_F(RepetitionTest, OverridesReachIntoTheBody) {
-  marrow::Diagnostics diagnostics;
-  marrow::PipelineArguments arguments;
+  Diagnostics diagnostics;
+  PipelineArguments arguments;
   arguments.overrides = {{"r.body.before.value", "40"}};
   const auto file = scratch.write("p.yaml", std::string("marrow: 1\nnodes:\n") + kOver + "outputs: {all: r.sum}\n");
-  pipeline = marrow::read_pipeline(file, arguments, catalogue(), diagnostics);
+  pipeline = read_pipeline(file, arguments, catalogue(), diagnostics);
   ASSERT_TRUE(diagnostics.empty()) << diagnostics.text();
   settings.store = nullptr;
-  EXPECT_EQ(numbers(output(marrow::run_pipeline(pipeline, catalogue(), settings))),
-            (std::vector<double>{140, 340, 640}));
-  const auto resolved = scratch.write("resolved.yaml", marrow::resolved_yaml(pipeline));
-  pipeline = marrow::read_pipeline(resolved, {}, catalogue(), diagnostics);
-  ASSERT_TRUE(diagnostics.empty()) << diagnostics.text() << marrow::resolved_yaml(pipeline);
-  EXPECT_EQ(numbers(output(marrow::run_pipeline(pipeline, catalogue(), settings))),
-            (std::vector<double>{140, 340, 640}));
+  EXPECT_EQ(numbers(output(run_pipeline(pipeline, catalogue(), settings))), (std::vector<double>{140, 340, 640}));
+  const auto resolved = scratch.write("resolved.yaml", resolved_yaml(pipeline));
+  pipeline = read_pipeline(resolved, {}, catalogue(), diagnostics);
+  ASSERT_TRUE(diagnostics.empty()) << diagnostics.text() << resolved_yaml(pipeline);
+  EXPECT_EQ(numbers(output(run_pipeline(pipeline, catalogue(), settings))), (std::vector<double>{140, 340, 640}));
 }
 
 TEST_F(RepetitionTest, FaultsAreFoundBeforeAnythingRuns) {
@@ -251,8 +245,8 @@ TEST_F(RepetitionTest, AnInputWithoutAValueIsNoFaultOfTheBody) {
   scratch.write("sum.yaml", body);
   std::string outer = std::string("marrow: 1\n") + kInput + "nodes:\n" + kOver + "outputs: {all: r.sum}\n";
   outer.insert(outer.find("in: {item"), "with: {amount: $amount}, ");
-  marrow::Diagnostics diagnostics;
-  marrow::read_pipeline(scratch.write("p.yaml", outer), {}, catalogue(), diagnostics, false);
+  Diagnostics diagnostics;
+  read_pipeline(scratch.write("p.yaml", outer), {}, catalogue(), diagnostics, false);
   EXPECT_EQ(diagnostics.text(), "") << "checked before it has its data";
 }
 
@@ -279,7 +273,7 @@ TEST_F(RepetitionTest, OneThreadAndTwoGiveTheSame) {
   for (const int threads : {1, 2, 4}) {
     read(kOver, "all: r.sum");
     settings.threads = threads;
-    all.push_back(numbers(output(marrow::run_pipeline(pipeline, catalogue(), settings))));
+    all.push_back(numbers(output(run_pipeline(pipeline, catalogue(), settings))));
   }
   EXPECT_EQ(all[0], all[1]);
   EXPECT_EQ(all[0], all[2]);

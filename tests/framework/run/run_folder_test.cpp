@@ -3,16 +3,12 @@
 #include "marrow/runtime/run/run_folder.hpp"
 
 #include <sys/wait.h>
-#include <unistd.h>
 
-#include <atomic>
 #include <cctype>
 #include <nlohmann/json.hpp>
-#include <set>
 #include <thread>
 
 #include "tests/framework/run_fixture.hpp"
-#include "tests/harness/message_of.hpp"
 #include "tests/plugins/write/full_disk.hpp"
 
 namespace run_folder_test {
@@ -110,10 +106,10 @@ TEST_F(RunFolderTest, WhatIsThereStays) {
     const fs::path folder = scratch.path / (std::string("with ") + name);
     fs::create_directory(folder);
     std::ofstream(folder / name) << "mine";
-    EXPECT_NE(message_of([&] {
-                RunFolder{folder, pipeline};
-              }).find("is already there and not empty; choose another with --out"),
-              std::string::npos);
+    EXPECT_HAS(message_of([&] {
+                 RunFolder{folder, pipeline};
+               }),
+               "is already there and not empty; choose another with --out");
     EXPECT_EQ(text_of(folder / name), "mine");
     EXPECT_EQ(std::distance(fs::directory_iterator(folder), fs::directory_iterator()), 1);
   }
@@ -122,10 +118,10 @@ TEST_F(RunFolderTest, WhatIsThereStays) {
 TEST_F(RunFolderTest, AFileIsNoFolder) {
   const marrow::Pipeline pipeline = pipeline_of("  c: {uses: test.constant}\n", "o: c");
   std::ofstream(scratch.path / "file") << "";
-  EXPECT_NE(message_of([&] {
-              RunFolder{scratch.path / "file", pipeline};
-            }).find("/file is a file; choose another with --out"),
-            std::string::npos);
+  EXPECT_HAS(message_of([&] {
+               RunFolder{scratch.path / "file", pipeline};
+             }),
+             "/file is a file; choose another with --out");
 }
 
 TEST_F(RunFolderTest, AfterAFullDiskASecondTrySucceeds) {
@@ -133,7 +129,7 @@ TEST_F(RunFolderTest, AfterAFullDiskASecondTrySucceeds) {
   const fs::path folder = scratch.path / "out";
   {
     const marrow::test::FullDisk full(10);
-    EXPECT_NE(message_of([&] { RunFolder{folder, pipeline}; }).find("cannot write"), std::string::npos);
+    EXPECT_HAS(message_of([&] { RunFolder{folder, pipeline}; }), "cannot write");
   }
   EXPECT_TRUE(fs::is_empty(folder));
   EXPECT_EQ(message_of([&] { RunFolder{folder, pipeline}; }), "");
@@ -149,12 +145,10 @@ TEST_F(RunFolderTest, FullDiskLeavesNoHalfRecordAndTheLogSaysSo) {
   {
     const marrow::test::FullDisk full(20);
     folder.log().write(marrow::LogLevel::info, "", std::string(100, 'x'));
-    EXPECT_NE(
-        message_of([&] { folder.write_record(pipeline, result, {}, test_catalogue(), {}, {}); }).find("cannot write"),
-        std::string::npos);
+    EXPECT_HAS(message_of([&] { folder.write_record(pipeline, result, {}, test_catalogue(), {}, {}); }),
+               "cannot write");
   }
-  EXPECT_NE(folder.log().fault().find("lines are missing in " + (folder.path() / "log.txt").string()),
-            std::string::npos)
+  EXPECT_HAS(folder.log().fault(), "lines are missing in " + (folder.path() / "log.txt").string())
       << folder.log().fault();
   EXPECT_FALSE(fs::exists(folder.path() / "run.json"));
   EXPECT_EQ(std::distance(fs::directory_iterator(folder.path()), fs::directory_iterator()), 3);
@@ -187,8 +181,7 @@ TEST_F(RunFolderTest, EachItemHasAFileOfItsOwn) {
   EXPECT_EQ(written[0].fault, "");
   ASSERT_EQ(written[0].files.size(), 10u);
   for (std::size_t i = 0; i < 10; ++i)
-    EXPECT_NE(text_of(folder.path() / written[0].files[i]).find("\"value\": " + std::to_string(10 * (i + 1)) + ".0"),
-              std::string::npos)
+    EXPECT_HAS(text_of(folder.path() / written[0].files[i]), "\"value\": " + std::to_string(10 * (i + 1)) + ".0")
         << written[0].files[i];
   EXPECT_EQ(written[0].files[0], "outputs/o/a%2Fb.json");
   EXPECT_EQ(written[0].files[1], "outputs/o/a_b.json");
@@ -254,7 +247,7 @@ TEST_F(RunFolderTest, RecordTellsAFailureThatMayBeFromOneThatMayNot) {
   EXPECT_EQ(record["outputs"][0]["absent"], "node 'f' failed");
   EXPECT_EQ(record["outputs"][1]["absent"], "node 'g' failed");
   EXPECT_FALSE(record["outputs"][2].contains("absent"));
-  EXPECT_NE(text_of(folder.path() / "pipeline.yaml").find("may_fail: true"), std::string::npos);
+  EXPECT_HAS(text_of(folder.path() / "pipeline.yaml"), "may_fail: true");
 }
 
 TEST_F(RunFolderTest, OneOutputDoesNotReplaceAnother) {

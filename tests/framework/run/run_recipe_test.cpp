@@ -1,26 +1,20 @@
 // SPDX-License-Identifier: Apache-2.0
 // What stands above a recipe's pipeline, and that it does not name the user.
-#include <gtest/gtest.h>
-
-#include <cstdlib>
-
-#include "marrow/runtime/run/run_recipe.hpp"
+#include "marrow/runtime/run/replay.hpp"
+#include "tests/framework/fixture.hpp"
 
 namespace run_recipe_test {
 
 class RunRecipeTest : public testing::Test {
  protected:
-  RunRecipeTest() : before_(std::getenv("HOME") ? std::getenv("HOME") : "") {}
-  ~RunRecipeTest() override { setenv("HOME", before_.c_str(), 1); }
-
-  static std::string pipeline_with(const std::string& home, const std::string& pipeline) {
-    setenv("HOME", home.c_str(), 1);
+  std::string pipeline_with(const std::string& home, const std::string& pipeline) {
+    environment_.set("HOME", home);
     const std::string text = marrow::RunRecipe{"1.2.3", 1, {}, pipeline}.text();
     return text.substr(text.find("--seed 1\n") + 9);
   }
 
  private:
-  std::string before_;
+  runtime_fixture::Environment environment_;
 };
 
 TEST_F(RunRecipeTest, SaysVersionSeedAndLimits) {
@@ -35,14 +29,11 @@ TEST_F(RunRecipeTest, SaysVersionSeedAndLimits) {
             "marrow: 1\n");
 }
 
-TEST_F(RunRecipeTest, NamesNoHomeFolder) {
+TEST_F(RunRecipeTest, NamesNoHomeFolderAndKeepsOtherPaths) {
   for (const std::string home : {"/home/jane", "/home/jane/"})
     EXPECT_EQ(
         pipeline_with(home, "a: /home/jane/ct\nb: [/home/jane, \"/home/jane/x y\"]\nc: cp /home/jane/a /home/jane"),
         "a: $env:HOME/ct\nb: [$env:HOME, \"$env:HOME/x y\"]\nc: cp $env:HOME/a $env:HOME");
-}
-
-TEST_F(RunRecipeTest, KeepsOtherPaths) {
   const std::string others = "a: /home/jane2/ct\nb: /data/home/jane/ct\nc: /home/jane.old\nd: /home\n";
   EXPECT_EQ(pipeline_with("/home/jane", others), others);
   for (const std::string no_home : {"", "/", "jane"}) EXPECT_EQ(pipeline_with(no_home, others), others);

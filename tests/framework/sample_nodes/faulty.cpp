@@ -2,8 +2,6 @@
 // A node that fails in every way that a plugin can fail a comparison.
 #include <chrono>
 #include <csignal>
-#include <filesystem>
-#include <limits>
 #include <thread>
 
 #include <marrow/plugin.hpp>

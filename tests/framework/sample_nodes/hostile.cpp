@@ -5,14 +5,10 @@
 #include <oneapi/tbb/parallel_for.h>
 #include <signal.h>
 
-#include <atomic>
 #include <chrono>
 #include <cstdlib>
-#include <filesystem>
-#include <limits>
 #include <locale>
 #include <marrow/plugin.hpp>
-#include <opencv2/core.hpp>
 #include <sstream>
 #include <thread>
 #ifdef __x86_64__

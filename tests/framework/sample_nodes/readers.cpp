@@ -1,13 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // Readers that do what a hostile file may make a reader do: the first word of the file says what.
-#include <atomic>
-#include <cmath>
 #include <csignal>
 #include <cstdlib>
 #include <fstream>
 #include <iostream>
 #include <numeric>
-#include <opencv2/core.hpp>
 #include <thread>
 
 #include <marrow/plugin.hpp>

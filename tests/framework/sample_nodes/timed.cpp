@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Nodes by which the tests see what a comparison times, what the first call pays, and what it makes of numbers that are
 // known.
-#include <algorithm>
-#include <atomic>
 #include <chrono>
 #include <cstdlib>
 #include <fstream>

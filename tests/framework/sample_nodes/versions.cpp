@@ -2,7 +2,6 @@
 // A plugin that is built twice, with another VERSION each: what a person's plugin is before and after a change of its
 // code.
 #include <chrono>
-#include <filesystem>
 
 #include <marrow/plugin.hpp>
 

@@ -1,31 +1,20 @@
 // SPDX-License-Identifier: Apache-2.0
 // The store that hosts share: what is kept there, who may read it, and what its faults do.
 #include "marrow/runtime/store/shared_store.hpp"
-#include "marrow/runtime/store/shared_claim.hpp"
 #include "marrow/runtime/store/shared_folder.hpp"
 
-#include <sys/stat.h>
 #include <sys/wait.h>
-#include <unistd.h>
 
-#include <atomic>
-#include <chrono>
 #include <thread>
 
 #include "marrow/runtime/store/store_entry.hpp"
-#include "tests/framework/environment.hpp"
 #include "tests/framework/identities.hpp"
 #include "tests/framework/store/store_fixture.hpp"
 
 namespace shared_store_test {
 
+using namespace marrow;
 namespace fs = std::filesystem;
-using marrow::Digest;
-using marrow::hash_of;
-using marrow::SharedLook;
-using marrow::SharedStore;
-using marrow::Store;
-using marrow::StoredResult;
 using store_fixture::many;
 using store_fixture::mode_of;
 using store_fixture::number;
@@ -36,8 +25,8 @@ void set_age(const fs::path& path, std::chrono::hours age) {
 }
 
 /// The provenance of a result that took this many seconds.
-marrow::Provenance took(double seconds) {
-  marrow::Provenance provenance;
+Provenance took(double seconds) {
+  Provenance provenance;
   provenance.node = "test.work";
   provenance.seconds = seconds;
   return provenance;
@@ -51,7 +40,7 @@ class SharedStoreTest : public StoreTest {
     chmod(folder.c_str(), 0700);
   }
   std::shared_ptr<SharedStore> open() const { return std::make_shared<SharedStore>(folder); }
-  fs::path file_of(const Digest& one) const { return marrow::entry_file(folder, one); }
+  fs::path file_of(const Digest& one) const { return entry_file(folder, one); }
   std::size_t files_below(const fs::path& path) const {
     std::size_t count = 0;
     for (const auto& entry : fs::recursive_directory_iterator(path)) count += entry.is_regular_file();
@@ -62,7 +51,7 @@ class SharedStoreTest : public StoreTest {
   }
   static std::optional<double> value_of(const std::optional<StoredResult>& found) {
     if (!found) return std::nullopt;
-    return found->outputs.at(0).as<marrow::Metrics>().items.at(0).value;
+    return found->outputs.at(0).as<Metrics>().items.at(0).value;
   }
   /// Why the folder cannot be used.
   std::string fault() const { return open()->fault(); }
@@ -91,7 +80,7 @@ TEST_F(SharedStoreTest, ALargeResultIsReadWhereItIs) {
   const Store host(scratch.path / "host", shared);
   const auto found = host.find(key);
   ASSERT_TRUE(found);
-  EXPECT_EQ(found->outputs[0].as<marrow::Volume>().values[999], 999);
+  EXPECT_EQ(found->outputs[0].as<Volume>().values[999], 999);
   EXPECT_FALSE(host.find(key, Store::Where::here));
 }
 
@@ -130,7 +119,7 @@ TEST_F(SharedStoreTest, ADamagedResultIsNotUsedAndIsReplaced) {
   offer(*shared, key, 7);
   EXPECT_EQ(value_of(host.find(key)), 7);
   fs::resize_file(file_of(key), 10);
-  fs::remove(marrow::entry_file(host.folder(), key));
+  fs::remove(entry_file(host.folder(), key));
   EXPECT_FALSE(host.find(key));
   fs::rename(file_of(key), scratch.path / "cut");
   offer(*shared, hash_of(2), 8);
@@ -146,9 +135,9 @@ TEST_F(SharedStoreTest, ItIsUsedByRunsOfTwoHosts) {
     const Store of_host(scratch.path / host, open());
     read(nodes, "o: own");
     settings.store = &of_host;
-    return marrow::run_pipeline(pipeline, store_fixture::test_catalogue(), settings);
+    return run_pipeline(pipeline, store_fixture::test_catalogue(), settings);
   };
-  const marrow::RunResult first = run_on("first"), second = run_on("second");
+  const RunResult first = run_on("first"), second = run_on("second");
   EXPECT_EQ(first.nodes[0].calls, 1);
   EXPECT_EQ(second.nodes[0].calls, 0);
   EXPECT_EQ(second.nodes[0].cached, 1);
@@ -199,7 +188,7 @@ TEST_F(SharedStoreTest, AGroupMayUseItIfTheFolderSaysSo) {
     ASSERT_EQ(chmod(folder.c_str(), of_folder), 0);
     const auto shared = open();
     offer(*shared, key, 7);
-    const marrow::SharedClaim claim = shared->claim(key, nullptr);
+    const SharedClaim claim = shared->claim(key, nullptr);
     for (const auto& entry : fs::recursive_directory_iterator(folder))
       EXPECT_EQ(mode_of(entry.path()), entry.is_directory() ? of_folder : of_file) << entry.path();
     EXPECT_EQ(files_below(folder), 3u) << "the marker, the result and the claim";
@@ -209,10 +198,10 @@ TEST_F(SharedStoreTest, AGroupMayUseItIfTheFolderSaysSo) {
 
 TEST_F(SharedStoreTest, WhatAnotherGroupWouldReadIsPrivate) {
   if (geteuid() != 0) GTEST_SKIP() << "only root can give a folder to another group";
-  const marrow::Permissions of_group_4711{0660, 0770, gid_t(4711)};
+  const Permissions of_group_4711{0660, 0770, gid_t(4711)};
   const fs::path file = folder / "file";
-  ASSERT_EQ(marrow::write_whole(
-                file, [](marrow::Archive&) {}, false, of_group_4711),
+  ASSERT_EQ(write_whole(
+                file, [](Archive&) {}, false, of_group_4711),
             "");
   struct stat status {};
   ASSERT_EQ(stat(file.c_str(), &status), 0);
@@ -222,8 +211,8 @@ TEST_F(SharedStoreTest, WhatAnotherGroupWouldReadIsPrivate) {
     if (chmod(folder.c_str(), 0777) != 0 || chmod(scratch.path.c_str(), 0755) != 0 || setgid(1234) != 0 ||
         setuid(1234) != 0)
       _exit(2);
-    const bool is_written = marrow::write_whole(
-                                folder / "mine", [](marrow::Archive&) {}, false, of_group_4711)
+    const bool is_written = write_whole(
+                                folder / "mine", [](Archive&) {}, false, of_group_4711)
                                 .empty();
     _exit(is_written && mode_of(folder / "mine") == 0600 ? 0 : 1);
   }
@@ -298,15 +287,15 @@ TEST_F(SharedStoreTest, ACaseNeverWritesOutsideItsFolder) {
   const auto shared = open();
   ASSERT_TRUE(shared->accepts());
   for (const char* name : {"../outside", "/tmp/marrow-outside", "a/../../outside", "", "a/", "."}) {
-    marrow::EntryDescription description;
+    EntryDescription description;
     description.key = key;
     description.payload = 4;
-    description.leaves.push_back({name, 0, 0, true, marrow::hash_of_bytes("text", 4), 0, 4, "", {}});
-    ASSERT_EQ(marrow::write_whole(file_of(key),
-                                  [&](marrow::Archive& out) {
-                                    marrow::write_description(out, description);
-                                    out.bytes("text", 4);
-                                  }),
+    description.leaves.push_back({name, 0, 0, true, hash_of_bytes("text", 4), 0, 4, "", {}});
+    ASSERT_EQ(write_whole(file_of(key),
+                          [&](Archive& out) {
+                            write_description(out, description);
+                            out.bytes("text", 4);
+                          }),
               "");
     EXPECT_FALSE(shared->fetch_case(key, scratch.path / "taken", SharedLook::quick)) << name;
     EXPECT_FALSE(fs::exists(scratch.path / "outside"));
@@ -354,7 +343,7 @@ TEST_F(SharedStoreTest, ManyThatMakeItAtTheSameTimeAllUseIt) {
     for (int k = 0; k < 4; ++k)
       makers.emplace_back([&] {
         for (++ready; ready < 4;) std::this_thread::yield();
-        const marrow::SharedFolderState state = marrow::make_shared(place);
+        const SharedFolderState state = make_shared(place);
         EXPECT_TRUE(state.is_store) << state.fault;
       });
     for (std::thread& maker : makers) maker.join();
@@ -362,11 +351,11 @@ TEST_F(SharedStoreTest, ManyThatMakeItAtTheSameTimeAllUseIt) {
 }
 
 TEST_F(SharedStoreTest, TheTimeIsThatOfTheFileSystem) {
-  const auto now = marrow::time_in(folder);
+  const auto now = time_in(folder);
   ASSERT_TRUE(now);
   EXPECT_NEAR(double(now->tv_sec), double(time(nullptr)), 60) << "the folder is on a disk of this host";
   EXPECT_TRUE(fs::is_empty(folder));
-  EXPECT_FALSE(marrow::time_in(folder / "absent"));
+  EXPECT_FALSE(time_in(folder / "absent"));
 }
 
 }  // namespace shared_store_test

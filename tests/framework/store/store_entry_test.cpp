@@ -2,20 +2,12 @@
 // Entries that do not match their names, or that no run ever wrote.
 #include "marrow/runtime/store/store_entry.hpp"
 
-#include <sys/stat.h>
-#include <unistd.h>
-
 #include "tests/framework/store/store_fixture.hpp"
 
 namespace store_entry_test {
 
+using namespace marrow;
 namespace fs = std::filesystem;
-using marrow::Digest;
-using marrow::EntryDescription;
-using marrow::Leaf;
-using marrow::Metrics;
-using marrow::Store;
-using marrow::Value;
 using runtime_fixture::Scratch;
 using runtime_fixture::test_catalogue;
 using store_fixture::kept_value;
@@ -23,15 +15,13 @@ using store_fixture::number;
 
 class StoreEntryTest : public testing::Test {
  protected:
-  fs::path file_of(const Digest& one) const { return marrow::entry_file(store.folder(), one); }
+  fs::path file_of(const Digest& one) const { return entry_file(store.folder(), one); }
   /// Writes an entry with that description, whole and with its hash.
   void forge(EntryDescription description) {
     description.key = key;
     description.payload = 0;
     ASSERT_EQ(store.prepare(), "");
-    ASSERT_EQ(
-        marrow::write_whole(file_of(key), [&](marrow::Archive& out) { marrow::write_entry(out, description, {}); }),
-        "");
+    ASSERT_EQ(write_whole(file_of(key), [&](Archive& out) { write_entry(out, description, {}); }), "");
   }
   Leaf leaf(bool present, std::uint64_t offset, std::uint64_t size) const {
     return {"metrics", 1, sizeof(Metrics), present, {}, offset, size, "", {}};
@@ -39,7 +29,7 @@ class StoreEntryTest : public testing::Test {
 
   Scratch scratch;
   Store store{scratch.path / "store"};
-  Digest key = marrow::hash_of(1), other = marrow::hash_of(2);
+  Digest key = hash_of(1), other = hash_of(2);
 };
 
 TEST_F(StoreEntryTest, AnEntryUnderAnothersNameIsNotAccepted) {
@@ -63,8 +53,8 @@ TEST_F(StoreEntryTest, WhatIsNoFileIsNoEntryAndIsLeft) {
 }
 
 TEST_F(StoreEntryTest, WhatWasNotMadeIsNotKept) {
-  struct Never : marrow::Source {
-    std::shared_ptr<const void> data(const marrow::TypeInfo&) override { return nullptr; }
+  struct Never : Source {
+    std::shared_ptr<const void> data(const TypeInfo&) override { return nullptr; }
   };
   Value missing = number(1);
   missing.data.reset();
@@ -77,17 +67,17 @@ TEST_F(StoreEntryTest, WhatAnotherPlaceCameToIsNotAccepted) {
   store.remember("one", {{"node", {key, {}}}});
   ASSERT_EQ(store.last("one").count("node"), 1u);
   const fs::path folder = store.folder() / "last";
-  fs::copy_file(folder / marrow::hash_of(std::string("one")).hex(), folder / marrow::hash_of(std::string("two")).hex());
+  fs::copy_file(folder / hash_of(std::string("one")).hex(), folder / hash_of(std::string("two")).hex());
   EXPECT_TRUE(store.last("two").empty());
 }
 
 TEST_F(StoreEntryTest, WhatOtherCallsOfAPlaceCameToStays) {
   store.remember("one", {{"a", {key, {}}}, {"b", {key, {}}}});
-  store.remember("one", {{"b", {marrow::hash_of(7), {}}}});
+  store.remember("one", {{"b", {hash_of(7), {}}}});
   const Store::LastResults last = store.last("one");
   ASSERT_EQ(last.size(), 2u);
   EXPECT_EQ(last.at("a").key, key);
-  EXPECT_EQ(last.at("b").key, marrow::hash_of(7));
+  EXPECT_EQ(last.at("b").key, hash_of(7));
 }
 
 TEST_F(StoreEntryTest, SizesThatWrapOrLieOutsideAreDamage) {
@@ -99,7 +89,7 @@ TEST_F(StoreEntryTest, SizesThatWrapOrLieOutsideAreDamage) {
   }
   forge({{}, {}, {leaf(true, 0, 0)}, 0});
   ASSERT_TRUE(store.find(key));
-  EXPECT_THROW(store.find(key)->outputs[0].as<Metrics>(), marrow::DamagedEntry) << "an empty value cannot be metrics";
+  EXPECT_THROW(store.find(key)->outputs[0].as<Metrics>(), DamagedEntry) << "an empty value cannot be metrics";
 }
 
 TEST_F(StoreEntryTest, ListsThatAreNoneAreDamage) {
@@ -122,18 +112,18 @@ TEST_F(StoreEntryTest, ListsThatAreNoneAreDamage) {
 }
 
 TEST_F(StoreEntryTest, AFileThatGetsShorterWhileItIsReadIsDamageAndNoCrash) {
-  marrow::Volume volume;
+  Volume volume;
   volume.grid.size = {1 << 20, 1, 1};
   volume.values.assign(volume.grid.count(), 1.5f);
   ASSERT_EQ(store.save(key, {kept_value(volume)}, {}), "");
   const auto found = store.find(key);
   ASSERT_TRUE(found);
   ASSERT_EQ(truncate(file_of(key).c_str(), 100000), 0);
-  EXPECT_THROW(found->outputs[0].as<marrow::Volume>(), marrow::DamagedEntry);
+  EXPECT_THROW(found->outputs[0].as<Volume>(), DamagedEntry);
 
   const fs::path part = scratch.write("part", std::string(1000000, 'x'));
-  const marrow::StoreFile file(part);
-  marrow::FileUnpacker unpacker(file, 0, file.size());
+  const StoreFile file(part);
+  FileUnpacker unpacker(file, 0, file.size());
   unpacker.get<char>();
   ASSERT_EQ(truncate(part.c_str(), 500000), 0);
   EXPECT_THROW((unpacker.get<std::array<char, 600000>>()), marrow::Error);
@@ -142,29 +132,29 @@ TEST_F(StoreEntryTest, AFileThatGetsShorterWhileItIsReadIsDamageAndNoCrash) {
 TEST_F(StoreEntryTest, LargeAndSmallPartsComeBackInOrder) {
   std::vector<std::string> texts;
   for (int i = 0; i < 200; ++i) texts.push_back(std::string(std::size_t(i) * 1717, char('a' + i % 26)));
-  marrow::Packer packer;
+  Packer packer;
   packer.add(texts);
-  const marrow::StoreFile file(scratch.write("texts", "before" + packer.packed + "after"));
-  marrow::FileUnpacker unpacker(file, 6, packer.packed.size());
+  const StoreFile file(scratch.write("texts", "before" + packer.packed + "after"));
+  FileUnpacker unpacker(file, 6, packer.packed.size());
   EXPECT_EQ(unpacker.get<std::vector<std::string>>(), texts);
   EXPECT_EQ(unpacker.remaining(), 0u);
-  EXPECT_EQ(unpacker.digest(), marrow::hash_of_bytes(packer.packed.data(), packer.packed.size()));
+  EXPECT_EQ(unpacker.digest(), hash_of_bytes(packer.packed.data(), packer.packed.size()));
 }
 
 TEST_F(StoreEntryTest, AValueOfAnotherTypeIsNotRead) {
   ASSERT_EQ(store.save(key, {number(1)}, {}), "");
-  EXPECT_THROW(store.find(key)->outputs[0].as<marrow::Mesh>(), marrow::DamagedEntry);
+  EXPECT_THROW(store.find(key)->outputs[0].as<Mesh>(), DamagedEntry);
 }
 
 TEST_F(StoreEntryTest, AResultOfOtherTypesThanTheNodesIsMadeAgain) {
-  marrow::Diagnostics diagnostics;
-  const marrow::Pipeline pipeline = marrow::read_pipeline(
+  Diagnostics diagnostics;
+  const Pipeline pipeline = read_pipeline(
       scratch.write("p.yaml", "marrow: 1\nnodes:\n  c: {uses: test.constant, with: {value: 5}}\noutputs: {c: c}\n"), {},
       test_catalogue(), diagnostics);
   ASSERT_TRUE(diagnostics.empty()) << diagnostics.text();
-  marrow::RunSettings settings;
+  RunSettings settings;
   settings.store = &store;
-  const auto calls = [&] { return marrow::run_pipeline(pipeline, test_catalogue(), settings).nodes[0].calls; };
+  const auto calls = [&] { return run_pipeline(pipeline, test_catalogue(), settings).nodes[0].calls; };
   EXPECT_EQ(calls(), 1);
   EXPECT_EQ(calls(), 0);
   const Digest result = store.entries().at(0).key;
@@ -177,7 +167,7 @@ TEST_F(StoreEntryTest, AResultOfOtherTypesThanTheNodesIsMadeAgain) {
   list.names = {"a"};
   list.items = {number(1)};
   list.data = nullptr;
-  for (const Value& wrong : {kept_value(marrow::Mesh{}), newer, larger, list}) {
+  for (const Value& wrong : {kept_value(Mesh{}), newer, larger, list}) {
     ASSERT_EQ(store.save(result, {wrong}, {}), "");
     EXPECT_EQ(calls(), 1) << wrong.type.id << " " << wrong.type.version << " " << wrong.axis;
     EXPECT_EQ(calls(), 0);

@@ -4,7 +4,6 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include "marrow/runtime/store/store.hpp"
 #include "marrow/runtime/store/store_folder.hpp"
 #include "tests/framework/run_fixture.hpp"
 

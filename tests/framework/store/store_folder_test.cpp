@@ -1,19 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // Who owns a store, what it touches and what it leaves alone, and that it keeps its size.
 #include <pwd.h>
-#include <sys/stat.h>
 #include <sys/wait.h>
-#include <unistd.h>
 
-#include <atomic>
-#include <chrono>
-#include <cstdlib>
-#include <functional>
-#include <set>
 #include <thread>
 
-#include "marrow/base/folder_use.hpp"
-#include "tests/framework/environment.hpp"
 #include "tests/framework/identities.hpp"
 #include "tests/framework/store/store_fixture.hpp"
 

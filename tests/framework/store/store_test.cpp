@@ -4,11 +4,7 @@
 
 namespace store_test {
 
-using marrow::Digest;
-using marrow::Metrics;
-using marrow::PlannedNode;
-using marrow::RunResult;
-using marrow::Value;
+using namespace marrow;
 using store_fixture::many;
 using store_fixture::number;
 using store_fixture::StoreTest;
@@ -26,8 +22,8 @@ TEST_F(StoreTest, ValuesComeBackAsTheyWere) {
   list.items = {number(1), number(2)};
   Value absent;
   absent.type = number(1).type;
-  const Digest key = marrow::hash_of(std::string("key"));
-  marrow::Provenance from;
+  const Digest key = hash_of(std::string("key"));
+  Provenance from;
   from.node = "test.x";
   from.options["low"] = "50";
   from.warnings = {"careful"};
@@ -42,7 +38,7 @@ TEST_F(StoreTest, ValuesComeBackAsTheyWere) {
   EXPECT_EQ(found->outputs[0].items[1].as<Metrics>().items[0].value, 2);
   EXPECT_EQ(found->outputs[0].items[1].as<Metrics>().items[0].unit, "mm");
   EXPECT_TRUE(found->outputs[1].is_absent());
-  EXPECT_EQ(marrow::hash_of(found->outputs[2].as<marrow::Volume>()), many(100000).key);
+  EXPECT_EQ(hash_of(found->outputs[2].as<Volume>()), many(100000).key);
 }
 
 TEST_F(StoreTest, SecondRunCallsNothing) {
@@ -50,7 +46,7 @@ TEST_F(StoreTest, SecondRunCallsNothing) {
   EXPECT_EQ(calls(first), 6);
   const RunResult second = run(kChain, "n: n, a: a");
   EXPECT_EQ(calls(second), 0);
-  EXPECT_EQ(second.nodes[2].status, marrow::NodeRecord::Status::not_needed) << "nothing that runs needs the function";
+  EXPECT_EQ(second.nodes[2].status, NodeRecord::Status::not_needed) << "nothing that runs needs the function";
   EXPECT_EQ(result_of(second), result_of(first));
   EXPECT_EQ(result_of(second), 10 + 5 + 20 + 5);
 }
@@ -65,7 +61,7 @@ TEST_F(StoreTest, WhatIsReadBackCanBeHandedToAnotherProcess) {
   run(nodes("0.25"), "r: r");
   const RunResult second = run(nodes("0.5"), "r: r");
   EXPECT_EQ(second.nodes[0].calls, 0) << "the number is read back";
-  ASSERT_EQ(second.nodes[1].status, marrow::NodeRecord::Status::done) << messages;
+  ASSERT_EQ(second.nodes[1].status, NodeRecord::Status::done) << messages;
   EXPECT_EQ(result_of(second) - std::floor(result_of(second)), 0.5);
   EXPECT_GE(result_of(second), 5.5);
 }
@@ -110,8 +106,8 @@ TEST_F(StoreTest, AFailedFunctionIsNamedByWhatNeedsIt) {
           "  a: {uses: test.apply, in: {adder: f, to: c}}\n",
           "a: a");
   EXPECT_TRUE(result.failed());
-  EXPECT_EQ(result.nodes[1].status, marrow::NodeRecord::Status::failed);
-  EXPECT_EQ(result.nodes[2].status, marrow::NodeRecord::Status::not_run);
+  EXPECT_EQ(result.nodes[1].status, NodeRecord::Status::failed);
+  EXPECT_EQ(result.nodes[2].status, NodeRecord::Status::not_run);
   EXPECT_EQ(result.nodes[2].reason, "node 'f' failed");
   EXPECT_EQ(messages, "node 'f' (test.failing_adder) failed: it cannot add (its inputs: amount = c)\n");
 }

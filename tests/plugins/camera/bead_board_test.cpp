@@ -1,11 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // From images to the calibration: the beads are found and told apart, and the device is calibrated from them.
 
-#include <cstdio>
-#include <map>
 #include <opencv2/imgproc.hpp>
 
-#include "marrow/read/calibration_file.hpp"
+#include "marrow/read/camera_file.hpp"
 #include "tests/plugins/camera/boards.hpp"
 #include "tests/plugins/read/damage.hpp"
 #include "tests/plugins/read/reading.hpp"

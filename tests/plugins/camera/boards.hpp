@@ -3,7 +3,6 @@
 // The board that ships, and views of it whose truth is known.
 #include <random>
 
-#include "marrow/toolbox/calibration/correspondence.hpp"
 #include "marrow/toolbox/phantom/board_views.hpp"
 
 namespace marrow::test {

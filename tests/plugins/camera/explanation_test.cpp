@@ -3,7 +3,6 @@
 #include <cmath>
 #include <random>
 
-#include "marrow/domain/c_arm.hpp"
 #include "marrow/toolbox/calibration/plausibility.hpp"
 #include "tests/plugins/read/files.hpp"
 

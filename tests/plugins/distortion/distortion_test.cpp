@@ -1,14 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // What a measured distortion does to points, images and masks, and between poses of the arm: hand-computed values.
 
-#include <cmath>
 #include <opencv2/imgproc.hpp>
 
 #include "marrow/domain/random.hpp"
-#include "marrow/domain/transform.hpp"
-#include "marrow/toolbox/distortion/arm.hpp"
 #include "marrow/toolbox/distortion/fit.hpp"
-#include "marrow/toolbox/distortion/straighten.hpp"
 #include "tests/plugins/read/files.hpp"
 
 namespace distortion_test {

@@ -2,15 +2,10 @@
 // A distortion's own file, the key of a camera file, and XMALab's files.
 
 #include <marrow/testing/node.hpp>
-#include <opencv2/core.hpp>
 
-#include "marrow/base/hash.hpp"
-#include "marrow/toolbox/distortion/distortion.hpp"
-#include "marrow/toolbox/distortion/plate_points.hpp"
 #include "marrow/toolbox/exchange/written_files.hpp"
 #include "marrow/toolbox/exchange/xmalab_grid.hpp"
 #include "marrow/toolbox/files/camera_file.hpp"
-#include "marrow/toolbox/files/distortion_file.hpp"
 #include "tests/plugins/read/damage.hpp"
 #include "tests/plugins/write/writing.hpp"
 

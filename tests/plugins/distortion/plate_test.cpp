@@ -3,7 +3,7 @@
 
 #include <marrow/testing/node.hpp>
 
-#include "marrow/toolbox/distortion/arm.hpp"
+#include "marrow/toolbox/distortion/fit.hpp"
 #include "marrow/toolbox/distortion/plate.hpp"
 #include "tests/plugins/read/files.hpp"
 
@@ -129,33 +129,26 @@ Tilted found_on_tilted(double tilt_deg, const std::string& straight, double iron
 }
 
 // Half an image of 512 px of 0.3 mm at 1000 mm: a tilt of a moves its rim by 256^2 sin(a) 0.3 / 1000 px.
-TEST(DistortionPlates, ATiltIsToldFromTheDistortion) {
+TEST(DistortionPlates, ATiltIsToldFromTheDistortionAndSaidIfItIsNotTaken) {
   for (const double tilt_deg : {2.0, 5.0, 15.0}) {
     const Tilted found = found_on_tilted(tilt_deg, "automatic");
     EXPECT_LT(found.error_px, 0.06) << tilt_deg;
     EXPECT_NEAR(found.perspective_px, 256 * 256 * std::sin(tilt_deg * 3.14159 / 180) * 0.3 / 1000, 0.15) << tilt_deg;
     EXPECT_LT(found.deviation_px, 0.1) << tilt_deg;
-    EXPECT_NE(found.told.find("is taken out of the distortion; if the plate is parallel"), std::string::npos)
-        << found.told;
+    EXPECT_HAS(found.told, "is taken out of the distortion; if the plate is parallel");
   }
   const Tilted parallel = found_on_tilted(0, "automatic");
   EXPECT_LT(parallel.perspective_px, 3 * parallel.deviation_px);
   EXPECT_EQ(parallel.told.find("tilt"), std::string::npos) << parallel.told;
-}
-
-TEST(DistortionPlates, ATiltThatIsNotTakenIsSaid) {
   const Tilted found = found_on_tilted(5, "similarity");
   EXPECT_GT(found.error_px, 0.2);
-  EXPECT_NE(found.told.find("it becomes a part of the distortion unless straight=automatic"), std::string::npos)
-      << found.told;
+  EXPECT_HAS(found.told, "it becomes a part of the distortion unless straight=automatic");
 }
 
 TEST(DistortionPlates, WhereIronHidesTheTiltThePlateIsTakenAsParallel) {
   const Tilted found = found_on_tilted(0, "automatic", 2);
   EXPECT_LT(found.error_px, 0.1);
-  EXPECT_NE(found.told.find("which the distortion hides, so the plate is taken as parallel to the detector"),
-            std::string::npos)
-      << found.told;
+  EXPECT_HAS(found.told, "which the distortion hides, so the plate is taken as parallel to the detector");
 }
 
 TEST(DistortionPlates, RefuseAnImageWithoutAPlate) {
@@ -240,7 +233,7 @@ TEST(DistortionBetween, SaysWhatDoesNotFit) {
   Context::Hooks hooks;
   hooks.log = [&](std::string_view text, LogLevel) { warned += text; };
   call("camera.distortion_between", inputs, options, Context(hooks));
-  EXPECT_NE(warned.find("'v' at 50 lies beyond the poses that were measured"), std::string::npos) << warned;
+  EXPECT_HAS(warned, "'v' at 50 lies beyond the poses that were measured");
 }
 
 }  // namespace plate_test

@@ -1,10 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "plugins/edges/adaptive_relaxation.cpp"
 
-#include <gtest/gtest.h>
-
-#include "shipped.hpp"
-#include "tests/plugins/edges/drawn.hpp"
+#include "tests/plugins/edges/radiograph.hpp"
 
 namespace {
 

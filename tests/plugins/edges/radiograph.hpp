@@ -2,8 +2,8 @@
 #pragma once
 // X-ray images of cylinders and balls by the exact length of each ray inside them: a shaft with its canal in a thigh,
 // with condyles, seen by a pinhole camera.
-#include <opencv2/core.hpp>
 
+#include "shipped.hpp"
 #include "tests/harness/node_test.hpp"
 
 namespace marrow::test::radiograph {
@@ -11,15 +11,11 @@ namespace marrow::test::radiograph {
 /// A C-arm view: source 600 mm before the isocentre, detector of size_px^2 pixels over 300 mm at 1000 mm. At 0 degrees
 /// the rays run along +y with the patient's left on the right and the head up; the angle turns about z.
 inline Camera camera(double angle_deg, int size_px = 512) {
-  Camera camera;
-  camera.width_px = camera.height_px = size_px;
-  const double focal_px = 1000.0 / (300.0 / size_px);
-  camera.intrinsics << focal_px, 0, 0.5 * (size_px - 1), 0, focal_px, 0.5 * (size_px - 1), 0, 0, 1;
+  Camera camera = before_origin(pinhole(1000.0 / (300.0 / size_px), size_px, size_px), 600);
   Matrix3d upright;
   upright << 1, 0, 0, 0, 0, -1, 0, 1, 0;
   camera.camera_from_world.rotation =
       upright * Eigen::AngleAxisd(radians(angle_deg), Vector3d::UnitZ()).toRotationMatrix();
-  camera.camera_from_world.translation_mm = {0, 0, 600};
   return camera;
 }
 
@@ -63,10 +59,7 @@ inline Scene shaft(const Vector3d& point, const Vector3d& direction, double oute
 /// 16 bit image with 60000 grey values and `photons` per pixel (0: no noise) beside the body; each pixel is the mean
 /// over 3 x 3 rays.
 inline View image(const std::string& name, const Camera& camera, const Scene& scene, double photons, unsigned seed) {
-  View view;
-  view.name = name;
-  view.camera = camera;
-  view.image.pixels.create(camera.height_px, camera.width_px, CV_16U);
+  View view = view_of(name, camera, cv::Mat(camera.height_px, camera.width_px, CV_16U));
   const Vector3d source = source_position_mm(camera);
   const Matrix3d world_from_pixel = camera.camera_from_world.rotation.transpose() * camera.intrinsics.inverse();
   std::mt19937 random(seed);
@@ -91,3 +84,39 @@ inline View image(const std::string& name, const Camera& camera, const Scene& sc
 }  // namespace marrow::test::radiograph
 
 namespace radiograph = marrow::test::radiograph;
+
+namespace edges {
+
+// Images whose edges are known exactly, and the detectors that shall find them.
+/// A view of an image whose brightness at a point is function(u, v); each pixel is the mean over 8 x 8 points.
+template <class Function>
+marrow::View drawn(int size, Function function, double noise = 0, unsigned seed = 1) {
+  marrow::View view = marrow::test::view_of("frontal", radiograph::camera(0, size), cv::Mat(size, size, CV_16U));
+  std::mt19937 random(seed);
+  std::normal_distribution<double> normal(0, noise > 0 ? noise : 1);
+  for (int v = 0; v < size; ++v)
+    for (int u = 0; u < size; ++u) {
+      double sum = 0;
+      for (int k = 0; k < 64; ++k) sum += function(u + (k % 8 - 3.5) / 8, v + (k / 8 - 3.5) / 8);
+      view.image.pixels.at<std::uint16_t>(v, u) =
+          cv::saturate_cast<std::uint16_t>(sum / 64 + (noise > 0 ? normal(random) : 0));
+    }
+  return view;
+}
+
+/// The nodes without the kind's name; of edges.gradient_mask, its masks.
+const std::vector<std::string> kDetectors{
+    "adaptive_relaxation", "canny", "laplacian_of_gaussian", "prewitt", "roberts", "sobel"};
+
+/// The edges that one of kDetectors finds.
+inline marrow::EdgeMap found(const std::string& detector, const marrow::View& view,
+                             marrow::Context context = marrow::Context()) {
+  const bool is_mask = detector == "prewitt" || detector == "roberts" || detector == "sobel";
+  const shipped::Options options = is_mask ? shipped::Options{{"mask", detector}} : shipped::Options{};
+  return shipped::call("edges." + (is_mask ? "gradient_mask" : detector), {{"view", shipped::item(view)}}, options,
+                       std::move(context))
+      .at("edges")
+      .as<marrow::EdgeMap>();
+}
+
+}  // namespace edges

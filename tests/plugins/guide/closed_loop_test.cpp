@@ -2,14 +2,12 @@
 // The guide with poses that are made up, without images: a robot that does what it is told, somewhere.
 #include "marrow/domain/random.hpp"
 #include "marrow/guide/servo.hpp"
-#include "marrow/toolbox/robotics/guide_state.hpp"
 #include "marrow/toolbox/robotics/robot_state.hpp"
 #include "tests/harness/node_test.hpp"
 
 namespace marrow::test::closed_loop_test {
 
-using robot::GuideState;
-using robot::RobotReport;
+using robot::GuideState, robot::RobotReport;
 
 /// Two blocks, one above the other, 2 mm apart at z = 0. The distal one lies below.
 constexpr double kHalf_mm = 12, kLong_mm = 60, kGap_mm = 2;
@@ -25,32 +23,15 @@ Mesh block(double from_z, double to_z) {
 }
 
 SignedField field(double from_z, double to_z) {
-  SignedField field;
-  field.grid.size = {33, 33, 81};
-  field.grid.spacing_mm = {2, 2, 2};
-  field.grid.origin_mm = {-32, -32, -80};
-  for (int z = 0; z < 81; ++z)
-    for (int y = 0; y < 33; ++y)
-      for (int x = 0; x < 33; ++x) {
-        const Vector3d at = field.grid.point_from_index(Vector3d(x, y, z));
-        field.values_mm.push_back(float(
-            std::max({std::abs(at.x()) - kHalf_mm, std::abs(at.y()) - kHalf_mm, from_z - at.z(), at.z() - to_z})));
-      }
-  return field;
+  return field_by(grid_at({33, 33, 81}, {-32, -32, -80}, {2, 2, 2}), [&](const Vector3d& at) {
+    return std::max({std::abs(at.x()) - kHalf_mm, std::abs(at.y()) - kHalf_mm, from_z - at.z(), at.z() - to_z});
+  });
 }
 
-List<Mesh> models() {
-  List<Mesh> all;
-  all.add("proximal", block(0, kLong_mm));
-  all.add("distal", block(-kGap_mm - kLong_mm, -kGap_mm));
-  return all;
-}
+List<Mesh> models() { return named("proximal", block(0, kLong_mm), "distal", block(-kGap_mm - kLong_mm, -kGap_mm)); }
 
 List<SignedField> fields() {
-  List<SignedField> all;
-  all.add("proximal", field(0, kLong_mm));
-  all.add("distal", field(-kGap_mm - kLong_mm, -kGap_mm));
-  return all;
+  return named("proximal", field(0, kLong_mm), "distal", field(-kGap_mm - kLong_mm, -kGap_mm));
 }
 
 const RigidTransform kProximal{"world", "ct", rotation_from_vector({0.2, 0.1, -0.3}), {5, 6, 7}};
@@ -85,6 +66,18 @@ Inputs inputs(const List<Pose>& poses, const GuideState& state = {}, const Robot
           {"models", shipped::list(models(), "fragment")}};
 }
 
+Outputs closed_loop(const List<Pose>& poses, const Options& options = {}) {
+  return call("guide.closed_loop", inputs(poses), options);
+}
+
+/// The robot pressed the bones together, and stopped.
+RobotReport pressed() {
+  RobotReport report;
+  report.stopped = "the force would pass 400 N";
+  report.is_pressed = true;
+  return report;
+}
+
 Stop stop_of(const Outputs& outputs) { return outputs.at("stop").as<Stop>(); }
 
 /// The loop, closed by a robot that stands anywhere. Each pair's outputs.
@@ -113,9 +106,8 @@ std::vector<Outputs> loop(const std::string& hand_eye, const Vector3d& stand_deg
 TEST(ClosedLoop, PosesWithoutAxesOfTheirOwnAreTakenAboutTheirSurfaces) {
   // A covariance about the CT's origin, as a file gives it, is the same one about the fragment's middle.
   const List<Pose> own = poses(displaced({6, -5, 9}, {8, -6, -10}));
-  List<Pose> from_files;
-  for (std::size_t i = 0; i < own.size(); ++i) from_files.add(own.name(i), in_frame(own[i], FragmentFrame()));
-  const auto expected = call("guide.closed_loop", inputs(own)), found = call("guide.closed_loop", inputs(from_files));
+  const List<Pose> from_files = own.changed([](Pose& pose, std::size_t) { pose = in_frame(pose, FragmentFrame()); });
+  const auto expected = closed_loop(own), found = closed_loop(from_files);
   const RigidTransform &one = expected.at("motion").as<Pose>().world_from_model,
                        &other = found.at("motion").as<Pose>().world_from_model;
   EXPECT_LT((one.rotation - other.rotation).norm(), 1e-9);
@@ -129,7 +121,7 @@ TEST(ClosedLoop, PosesWithoutAxesOfTheirOwnAreTakenAboutTheirSurfaces) {
 TEST(ClosedLoop, ReducesTheFractureWhereverTheRobotStands) {
   for (const Vector3d& stand : {Vector3d(0, 5, 0), Vector3d(60, -50, 40), Vector3d(-100, 90, 60)}) {
     const auto pairs = loop("estimated", stand);
-    EXPECT_TRUE(stop_of(pairs.back()).reason.starts_with("the fracture is reduced: ")) << stop_of(pairs.back()).reason;
+    EXPECT_BEGINS(stop_of(pairs.back()).reason, "the fracture is reduced: ");
     EXPECT_LE(pairs.size(), 7u);
     EXPECT_LT(figure(pairs.back().at("metrics"), "rotation_deg"), 0.5);
     EXPECT_LT(figure(pairs.back().at("metrics"), "shift_mm"), 0.5);
@@ -164,16 +156,14 @@ double astray_mm(const Value& figures) {
 
 TEST(ClosedLoop, TheFirstStepIsShortIfTheRobotMayStandAnywhere) {
   const auto first = [](double limit_mm, const std::string& hand_eye) {
-    return call("guide.closed_loop", inputs(poses(displaced({6, -5, 9}, {8, -6, -10}))),
-                {{"hand_eye", hand_eye}, {"astray_mm", limit_mm}})
+    return closed_loop(poses(displaced({6, -5, 9}, {8, -6, -10})), {{"hand_eye", hand_eye}, {"astray_mm", limit_mm}})
         .at("metrics");
   };
   EXPECT_NEAR(astray_mm(first(12, "estimated")), 12, 1e-6);
   EXPECT_NEAR(astray_mm(first(20, "estimated")), 20, 1e-6);
   EXPECT_GT(astray_mm(first(12, "fixed")), 20);
   // As far as the bones are apart, it may go astray in any case. The gap is 2 mm in the CT, and 10 mm more.
-  const Value apart =
-      call("guide.closed_loop", inputs(poses(displaced({0, 0, 5}, {0, 0, -10}))), {{"astray_mm", 1.0}}).at("metrics");
+  const Value apart = closed_loop(poses(displaced({0, 0, 5}, {0, 0, -10})), {{"astray_mm", 1.0}}).at("metrics");
   EXPECT_NEAR(figure(apart, "distance_mm"), 12, 1e-3);
   EXPECT_NEAR(astray_mm(apart), 12, 0.01);
 }
@@ -182,14 +172,11 @@ TEST(ClosedLoop, AfterBonesHavePressedItGoesBack) {
   GuideState state;
   state.told.rotation = rotation_from_vector({0.01, 0.02, 0});
   state.told.translation_mm = {1, 2, 3};
-  RobotReport pressed;
-  pressed.stopped = "the force would pass 400 N";
-  pressed.is_pressed = true;
   const auto poses_now = poses(displaced({6, -5, 9}, {8, -6, -10}));
   const auto told = [&](const RobotReport& report) {
     return output<Pose>("guide.closed_loop", "motion", inputs(poses_now, state, report)).world_from_model;
   };
-  const RigidTransform none = told(pressed) * state.told;
+  const RigidTransform none = told(pressed()) * state.told;
   EXPECT_TRUE(none.rotation.isIdentity(1e-9) && none.translation_mm.isZero(1e-9));
   // It does not, because the robot cannot reach farther.
   RobotReport beyond;
@@ -200,17 +187,14 @@ TEST(ClosedLoop, AfterBonesHavePressedItGoesBack) {
 TEST(ClosedLoop, AfterBonesHavePressedItPullsThemApartIfItKnowsHow) {
   const auto pairs = loop("estimated", {60, -50, 40});
   GuideState state = pairs[3].at("state").as<GuideState>();
-  RobotReport pressed;
-  pressed.stopped = "the force would pass 400 N";
-  pressed.is_pressed = true;
-  const auto pair = call("guide.closed_loop", inputs(poses(displaced({6, -5, 9}, {8, -6, -10})), state, pressed));
-  EXPECT_TRUE(stop_of(pair).reason.starts_with("distract: ")) << stop_of(pair).reason;
+  const auto pair = call("guide.closed_loop", inputs(poses(displaced({6, -5, 9}, {8, -6, -10})), state, pressed()));
+  EXPECT_BEGINS(stop_of(pair).reason, "distract: ");
   EXPECT_NEAR(figure(pair.at("metrics"), "step_mm"), 4, 1e-6);
   EXPECT_EQ(figure(pair.at("metrics"), "step_deg"), 0);
 }
 
 TEST(ClosedLoop, FragmentsThatOverlapAreMovedApart) {
-  const auto pair = call("guide.closed_loop", inputs(poses(displaced({0, 0, 0}, {9, 0, 10}))));
+  const auto pair = closed_loop(poses(displaced({0, 0, 0}, {9, 0, 10})));
   EXPECT_LT(figure(pair.at("metrics"), "distance_mm"), 0);
   // Away from the proximal fragment, which lies at larger z of its own frame.
   const RigidTransform told = pair.at("motion").as<Pose>().world_from_model;
@@ -219,15 +203,13 @@ TEST(ClosedLoop, FragmentsThatOverlapAreMovedApart) {
 
 TEST(ClosedLoop, EndsWhereTheImagesShowNoMore) {
   const auto reason = [](double turn_deg, double shift_mm) {
-    return stop_of(call("guide.closed_loop", inputs(poses(displaced({0, 0, turn_deg}, {shift_mm, 0, 0}), 0.3, 0.2))))
-        .reason;
+    return stop_of(closed_loop(poses(displaced({0, 0, turn_deg}, {shift_mm, 0, 0}), 0.3, 0.2))).reason;
   };
-  EXPECT_TRUE(
-      reason(0.4, 0.2).starts_with("the fragment is in its place as far as the images show: 0.40 degrees and 0.20 mm "
-                                   "remain, known to 0.42 degrees and 0.43 mm"))
-      << reason(0.4, 0.2);
-  EXPECT_TRUE(reason(0.5, 0.2).starts_with("release: ")) << reason(0.5, 0.2);
-  EXPECT_TRUE(reason(0.4, 0.5).starts_with("release: ")) << reason(0.4, 0.5);
+  EXPECT_BEGINS(reason(0.4, 0.2),
+                "the fragment is in its place as far as the images show: 0.40 degrees and 0.20 mm "
+                "remain, known to 0.42 degrees and 0.43 mm");
+  EXPECT_BEGINS(reason(0.5, 0.2), "release: ");
+  EXPECT_BEGINS(reason(0.4, 0.5), "release: ");
 }
 
 TEST(ClosedLoop, StopsForAReason) {
@@ -235,34 +217,27 @@ TEST(ClosedLoop, StopsForAReason) {
   RobotReport report;
   state.stops = 3;
   report.stopped = "the force would pass 400 N";
-  EXPECT_TRUE(stop_of(call("guide.closed_loop", inputs(poses(displaced({5, 0, 0}, {5, 0, -5})), state, report)))
-                  .reason.starts_with("the robot stopped 4 times in a row: the force would pass 400 N; "));
-  EXPECT_TRUE(stop_of(call("guide.closed_loop", inputs(poses(displaced({5, 0, 0}, {5, 0, -5}), 3, 0.1))))
-                  .reason.starts_with("the poses are not trusted: they are known to 4.24 degrees and "));
-  List<Pose> unknown = poses(displaced({5, 0, 0}, {5, 0, -5}));
-  List<Pose> without;
-  for (std::size_t i = 0; i < unknown.size(); ++i) {
-    Pose pose = unknown[i];
-    if (unknown.name(i) == "distal") pose.covariance.reset();
-    without.add(unknown.name(i), pose);
-  }
-  EXPECT_EQ(stop_of(call("guide.closed_loop", inputs(without))).reason,
+  EXPECT_BEGINS(
+      stop_of(call("guide.closed_loop", inputs(poses(displaced({5, 0, 0}, {5, 0, -5})), state, report))).reason,
+      "the robot stopped 4 times in a row: the force would pass 400 N; ");
+  EXPECT_BEGINS(stop_of(closed_loop(poses(displaced({5, 0, 0}, {5, 0, -5}), 3, 0.1))).reason,
+                "the poses are not trusted: they are known to 4.24 degrees and ");
+  const List<Pose> unknown = poses(displaced({5, 0, 0}, {5, 0, -5}));
+  Pose without = *unknown.find("distal");
+  without.covariance.reset();
+  EXPECT_EQ(stop_of(closed_loop(named("proximal", *unknown.find("proximal"), "distal", without))).reason,
             "the pose of 'distal' is not trusted: the images do not determine it");
   Verdict verdict;
   verdict.judgement = Judgement::wrong;
   verdict.reasons = {"it lies on no edge"};
-  List<Verdict> verdicts;
-  verdicts.add("distal", verdict);
-  Inputs judged = inputs(unknown);
-  judged["verdicts"] = shipped::list(verdicts, "fragment");
-  EXPECT_EQ(stop_of(call("guide.closed_loop", judged)).reason,
-            "the pose of 'distal' is not trusted: it lies on no edge");
+  EXPECT_EQ(
+      stop_of(call("guide.closed_loop", with(inputs(unknown), {{"verdicts", per_fragment("distal", verdict)}}))).reason,
+      "the pose of 'distal' is not trusted: it lies on no edge");
 }
 
 TEST(ClosedLoop, SaysWhatIsMissing) {
   Inputs lacking = inputs(poses(displaced({1, 0, 0}, {0, 0, -5})));
-  List<Mesh> one;
-  one.add("proximal", block(0, kLong_mm));
+  const List<Mesh> one = named("proximal", block(0, kLong_mm));
   lacking["models"] = shipped::list(one, "fragment");
   EXPECT_EQ(
       refusal("guide.closed_loop", lacking),
@@ -270,9 +245,7 @@ TEST(ClosedLoop, SaysWhatIsMissing) {
   List<Mesh> apart = one;
   apart.add("distal", block(-80, -40));
   lacking["models"] = shipped::list(apart, "fragment");
-  List<SignedField> fields;
-  fields.add("proximal", field(0, kLong_mm));
-  fields.add("distal", field(-80, -40));
+  const List<SignedField> fields = named("proximal", field(0, kLong_mm), "distal", field(-80, -40));
   lacking["fields"] = shipped::list(fields, "fragment");
   EXPECT_EQ(refusal("guide.closed_loop", lacking),
             "the two fragments are nowhere within 3 mm of each other in the CT; are they sides of one fracture?");

@@ -41,7 +41,6 @@ struct Trial {
               {"views", each_view(views)},
               {"edges", shipped::list(edges, "view")},
               {"projector", Value::of<OutlineProjector>(std::make_shared<const BodyProjector>(body()))}};
-    const Inputs compared{{"views", inputs["views"]}, {"edges", inputs["edges"]}, {"projector", inputs["projector"]}};
     inputs["cost"] = Value::of<Cost>(
         cost_by("similarity.contour_distance",
                 {{"views", inputs["views"]}, {"edges", inputs["edges"]}, {"projector", inputs["projector"]}},
@@ -118,10 +117,9 @@ TEST(FreeSearch, SaysWhatIsWrong) {
   const Trial trial(placed({0, 0, 0}, {0.4, -1.9, 0.8}));
   Inputs unwired = trial.inputs;
   unwired.erase("edges");
-  EXPECT_EQ(
-      refusal(node, unwired),
-      "a search without a start needs projector, views and edges, but nothing is wired to edges; wire it, or give "
-      "a start");
+  EXPECT_EQ(refusal(node, unwired),
+            "a search without a start needs projector, views and edges, but nothing is wired to edges; wire it, or "
+            "give a start");
   View moved = trial.views[1];
   moved.camera.camera_from_world.translation_mm += Vector3d(0, 3000, 0);
   EXPECT_EQ(refusal(node, with(trial.inputs, {{"views", each_view(trial.views[0], moved)}})),

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <Eigen/Cholesky>
 
-#include "marrow/base/number_text.hpp"
 #include "tests/plugins/initial/landmark_scene.hpp"
 
 namespace marrow::test::landmarks_test {

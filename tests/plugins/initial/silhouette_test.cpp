@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // A start from silhouettes: shapes of outlines that are known by hand, and bodies of ellipsoids, whose silhouettes are
 // exact, in any orientation.
-#include "marrow/initial/outline_shape.hpp"
-#include "marrow/initial/seen_silhouette.hpp"
+#include "marrow/initial/shape_library.hpp"
 #include "marrow/toolbox/analytic/body.hpp"
 
 namespace marrow::test::silhouette_test {
@@ -169,9 +168,9 @@ TEST(Silhouette, FaultsAreSaid) {
             "mask.network with leave_out: [background]");
   EXPECT_EQ(said(nothing_shown(view.camera)),
             "initial.silhouette: view 'at 0': its mask is empty, so the part is not seen; look at the mask's node");
-  EXPECT_EQ(said(mask_of(view.camera, {0, 0, kSize_px, kSize_px})),
-            "initial.silhouette: view 'at 0': its mask is the whole image, which is no silhouette; look at the mask's "
-            "node");
+  EXPECT_EQ(
+      said(mask_of(view.camera, {0, 0, kSize_px, kSize_px})),
+      "initial.silhouette: view 'at 0': its mask is the whole image, which is no silhouette; look at the mask's node");
   EXPECT_EQ(said(mask_of(view.camera, {0, 0, kSize_px, 100})),
             "initial.silhouette: the image's border cuts off the silhouette in view 'at 0', so its shape is not known; "
             "take images that show the whole part, or another start");

@@ -44,7 +44,7 @@ TEST(MaskThreshold, KeepsTheLargestRegionOfMetal) {
   EXPECT_NEAR(pixels, kLarge.area(), 20) << "an opening rounds the corners";
 }
 
-TEST(MaskThreshold, KeepsTheSecondRegion) { expect_box(kept(view(), {{"region", std::int64_t(2)}}).first, kSmall); }
+TEST(MaskThreshold, KeepsTheSecondRegion) { expect_box(kept(view(), {{"region", 2}}).first, kSmall); }
 
 TEST(MaskThreshold, KeepsTheOutsideIfAsked) {
   EXPECT_EQ(kept(view(), {{"at_border", true}, {"grey_value", 2000.0}}).first, cv::Rect(0, 190, 200, 10));
@@ -65,8 +65,7 @@ TEST(MaskThreshold, TakesTheGivenValue) {
 
 TEST(MaskThreshold, LeavesOutSmallRegions) {
   // The smaller plate has 1 % of the image.
-  EXPECT_NE(refusal("mask.threshold", {{"view", item(view())}}, {{"region", std::int64_t(2)}, {"least_percent", 1.5}}),
-            "");
+  EXPECT_NE(refusal("mask.threshold", {{"view", item(view())}}, {{"region", 2}, {"least_percent", 1.5}}), "");
 }
 
 TEST(MaskThreshold, KeepsWhatIsBright) {
@@ -83,10 +82,9 @@ TEST(MaskThreshold, LeavesOutWhatWasLeftOut) {
 }
 
 TEST(MaskThreshold, SaysIfThereAreTooFewRegions) {
-  EXPECT_EQ(
-      refusal("mask.threshold", {{"view", item(view())}}, {{"region", std::int64_t(3)}}),
-      "mask.threshold: view 'front': no grey value gives 3 regions away from the image's border; give a grey_value, "
-      "or another mask");
+  EXPECT_EQ(refusal("mask.threshold", {{"view", item(view())}}, {{"region", 3}}),
+            "mask.threshold: view 'front': no grey value gives 3 regions away from the image's border; give a "
+            "grey_value, or another mask");
 }
 
 }  // namespace marrow::test::mask_threshold_test

@@ -2,7 +2,7 @@
 // Linked to CGAL's surface mesher, as the node mesh.delaunay is.
 #include <set>
 
-#include "marrow/mesh/signs.hpp"
+#include "marrow/mesh/surface.hpp"
 #include "plugins/mesh/delaunay_refinement.hpp"
 #include "tests/plugins/mesh/shapes.hpp"
 

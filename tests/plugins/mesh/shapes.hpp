@@ -24,13 +24,21 @@ inline Grid turned_grid(std::array<int, 3> size) {
   return grid;
 }
 
-inline SignedField field_of(const Grid& grid, const Distance& distance_mm) {
-  SignedField field{grid, std::vector<float>(grid.count())};
-  for (int z = 0; z < grid.size[2]; ++z)
-    for (int y = 0; y < grid.size[1]; ++y)
-      for (int x = 0; x < grid.size[0]; ++x)
-        field.values_mm[grid.offset(x, y, z)] = float(distance_mm(grid.point_from_index(Vector3d(x, y, z))));
-  return field;
+inline SignedField sphere_field(double radius_mm = 15, std::array<int, 3> size = {48, 48, 40}) {
+  return field_by(turned_grid(size), [=](const Vector3d& p) { return sphere(p, radius_mm); });
+}
+
+/// A hollow ball with a speck beside it.
+inline SignedField shell_and_speck() {
+  return field_by(turned_grid({64, 64, 52}), [](const Vector3d& p) {
+    return std::min(std::abs(p.norm() - 12) - 2, (p - Vector3d(0, 0, 19)).norm() - 3);
+  });
+}
+
+/// A cylinder that the border cuts at both ends.
+inline SignedField cut_cylinder() {
+  return field_by(grid_at({40, 40, 11}, {0, 0, 0}, {1, 1, 2}),
+                  [](const Vector3d& p) { return std::hypot(p.x() - 19.7, p.y() - 19.4) - 10; });
 }
 
 /// A field of noise: all 256 patterns of a cell occur, with every kind of neighbour. `inside_part`: the share of

@@ -1,9 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-#include "marrow/domain/c_arm.hpp"
+#include "marrow/domain/camera.hpp"
 #include "marrow/toolbox/geometry/implant.hpp"
-#include "marrow/toolbox/geometry/locking_plan.hpp"
-#include "marrow/toolbox/phantom/loft.hpp"
+#include "marrow/toolbox/phantom/phantom.hpp"
 #include "tests/harness/node_test.hpp"
 
 namespace marrow::test::implants {
@@ -24,13 +23,8 @@ inline Camera camera(double alpha_deg, double beta_deg) {
 
 inline List<View> views() {
   List<View> views;
-  for (const auto& [name, beta_deg] : {std::pair("frontal", 0.0), std::pair("lateral", 90.0)}) {
-    View view;
-    view.name = name;
-    view.camera = camera(0, beta_deg);
-    view.image.pixels = cv::Mat(512, 512, CV_16U, cv::Scalar(1000));
-    views.add(name, view);
-  }
+  for (const auto& [name, beta_deg] : {std::pair("frontal", 0.0), std::pair("lateral", 90.0)})
+    views.add(name, view_of(name, camera(0, beta_deg), cv::Mat(512, 512, CV_16U, cv::Scalar(1000))));
   return views;
 }
 

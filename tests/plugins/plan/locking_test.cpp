@@ -158,8 +158,7 @@ class Constant : public Cost {
 TEST(PlanLocking, DoubtsAreSaidInWords) {
   Pose at = pose({0, 0, 0}, {0, 0, 50}, {0, 0, 0});
   EXPECT_EQ(verdict_of(at).judgement, Judgement::trusted);
-  EXPECT_NE(verdict_of(at).reasons.at(0).find("the axes of the holes are known to 0.01 degrees and "),
-            std::string::npos);
+  EXPECT_HAS(verdict_of(at).reasons.at(0), "the axes of the holes are known to 0.01 degrees and ");
   const auto is_doubted = [&](const std::string& reason, const Options& options = {}) {
     const Verdict verdict = verdict_of(at, options);
     EXPECT_EQ(verdict.judgement, Judgement::doubtful);
@@ -193,34 +192,31 @@ TEST(PlanLocking, RefusesWhatCannotBePlanned) {
   const auto refusal = [](const Implant& implant, const Pose& pose, const Options& options = {}) {
     return shipped::refusal("plan.locking", inputs(implant, pose), implants::of_left_leg(options));
   };
-  Implant without = rod();
-  without.holes.clear();
-  EXPECT_EQ(refusal(without, at),
+  const auto changed = [&](const std::function<void(Implant&)>& change) {
+    Implant implant = rod();
+    change(implant);
+    return refusal(implant, at);
+  };
+  EXPECT_EQ(changed([](Implant& rod) { rod.holes.clear(); }),
             "plan.locking: the implant has no holes, so there is nothing to lock; give each hole's centre and axis");
-  Implant flat = rod();
-  flat.holes[0].axis.setZero();
-  EXPECT_EQ(refusal(flat, at),
+  EXPECT_EQ(changed([](Implant& rod) { rod.holes[0].axis.setZero(); }),
             "plan.locking: the axis of hole 'distal' has the length 0.000000, so it has no direction; give the "
             "direction of the hole, such as [1, 0, 0]");
-  flat.holes[0].axis = {0.5, 0, 0};
-  EXPECT_EQ(refusal(flat, at), "plan.locking: the axis of hole 'distal' must have length 1, got 0.500000");
-  Implant twice = rod();
-  twice.holes.push_back(twice.holes[0]);
-  EXPECT_EQ(refusal(twice, at), "plan.locking: two holes are named 'distal'; rename one");
-  Implant narrow = rod();
-  narrow.holes[0].diameter_mm = 0;
-  EXPECT_EQ(refusal(narrow, at), "plan.locking: the diameter of hole 'distal' must be above 0 mm, got 0.000000");
-  Implant nowhere = rod();
-  nowhere.holes[0].centre_mm.x() = std::nan("");
-  EXPECT_EQ(refusal(nowhere, at), "plan.locking: the centre of hole 'distal' is not finite");
-  Implant open = rod();
-  open.surface.triangles.pop_back();
-  EXPECT_EQ(refusal(open, at),
+  EXPECT_EQ(changed([](Implant& rod) { rod.holes[0].axis *= 0.5; }),
+            "plan.locking: the axis of hole 'distal' must have length 1, got 0.500000");
+  EXPECT_EQ(changed([](Implant& rod) { rod.holes.push_back(rod.holes[0]); }),
+            "plan.locking: two holes are named 'distal'; rename one");
+  EXPECT_EQ(changed([](Implant& rod) { rod.holes[0].diameter_mm = 0; }),
+            "plan.locking: the diameter of hole 'distal' must be above 0 mm, got 0.000000");
+  EXPECT_EQ(changed([](Implant& rod) { rod.holes[0].centre_mm.x() = std::nan(""); }),
+            "plan.locking: the centre of hole 'distal' is not finite");
+  EXPECT_EQ(changed([](Implant& rod) { rod.surface.triangles.pop_back(); }),
             "plan.locking: the surface is open or not consistently oriented, so it has no inside; close its holes "
             "(each edge must be shared by exactly two triangles)");
-  Implant inward = rod();
-  for (auto& triangle : inward.surface.triangles) std::swap(triangle[0], triangle[1]);
-  EXPECT_NE(refusal(inward, at).find("plan.locking: the triangles face inward (enclosed volume -"), std::string::npos);
+  EXPECT_HAS(changed([](Implant& rod) {
+               for (auto& triangle : rod.surface.triangles) std::swap(triangle[0], triangle[1]);
+             }),
+             "plan.locking: the triangles face inward (enclosed volume -");
   EXPECT_EQ(refusal(rod(), pose({0, 0, 0}, {0, 0, 50}, {0, 0, 300})),
             "plan.locking: no view shows any of the 1 holes of the nail at its pose; take images of the nail's tip, or "
             "check the pose");
@@ -239,8 +235,7 @@ TEST(PlanLocking, RefusesWhatCannotBePlanned) {
 TEST(PlanBodies, BonesNailAndARodForEachHole) {
   const Pose at = pose({0, 0, 0}, {0, 0, 50}, {0, 0, 0});
   const auto plan = implants::locking(rod(), at).at("plan");
-  List<Pose> poses;
-  poses.add("femur", at);
+  const List<Pose> poses = named("femur", at);
   const auto bodies =
       call("plan.bodies", {{"models", per_fragment("femur", rod().surface, "without a pose", rod().surface)},
                            {"poses", shipped::list(poses, "fragment")},

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // What every projector of outlines must satisfy, with its own tolerance in pixels.
-#include <marrow/base/error.hpp>
 
-#include "tests/plugins/project/made.hpp"
 #include "tests/plugins/project/shapes.hpp"
 
 namespace marrow::test::outlines_test {
@@ -16,7 +14,9 @@ void PrintTo(const Node& node, std::ostream* stream) { *stream << node.name; }
 class Outlines : public testing::TestWithParam<Node> {
  protected:
   static std::shared_ptr<const OutlineProjector> make(const Mesh& mesh, const Volume* volume) {
-    return made::outlines(std::string("project.") + GetParam().name, mesh, volume);
+    Inputs inputs{{"model", item(mesh)}};
+    if (volume) inputs["volume"] = item(*volume);
+    return made<OutlineProjector>(std::string("project.") + GetParam().name, "projector", inputs);
   }
 };
 INSTANTIATE_TEST_SUITE_P(, Outlines, testing::Values(Node{"silhouette", 0.8, 4}, Node{"silhouette_edges", 0.02, 0.01}),
@@ -91,7 +91,7 @@ TEST_P(Outlines, EndsOfTheVolumeAreLeftOut) {
   for (const auto& p : make(mesh, nullptr)->outline(camera, pose, 1)) level += std::abs(p.normal_v) > 0.9;
   EXPECT_GT(level, 60u);
 
-  const auto refusal = [&] { return message_of([&] { make(mesh, &volume); }); };
+  const auto refusal = [&] { return MESSAGE_OF(make(mesh, &volume)); };
   volume.grid.origin_mm.x() += 500;
   EXPECT_EQ(refusal(), "only 0 % of the mesh lies in the volume; give those that belong together");
   volume.grid.frame = "mr";
@@ -112,13 +112,13 @@ TEST_P(Outlines, KeepsInsideTheImage) {
 }
 
 TEST_P(Outlines, RefusesNonsense) {
-  EXPECT_EQ(message_of([&] { make(Mesh{}, nullptr); }), "the mesh to project: the surface has no triangles");
+  EXPECT_EQ(MESSAGE_OF(make(Mesh{}, nullptr)), "the mesh to project: the surface has no triangles");
   const Mesh mesh = shapes::sphere(10);
   EXPECT_THROW(make(mesh, nullptr)->outline(shapes::c_arm(0), shapes::centred_at({0, 0, 10}), 0), Error);
 }
 
 std::shared_ptr<const OutlineProjector> exact_outline(const Mesh& mesh) {
-  return made::outlines("project.silhouette_edges", mesh, nullptr);
+  return made<OutlineProjector>("project.silhouette_edges", "projector", {{"model", item(mesh)}});
 }
 
 TEST(SilhouetteEdges, OpenSurfaceGivesItsSidesOnly) {

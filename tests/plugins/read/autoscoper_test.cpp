@@ -101,7 +101,7 @@ TEST_F(ReadAutoscoper, AllMissingFilesAtTheirLines) {
   for (const char* line : {"/trial.cfg:5:1: error: mayaCam_csv: /Calibration/two.txt is not there\n",
                            "/trial.cfg:6:1: error: CameraRootDir: /Frames/one is not there\n",
                            "/trial.cfg:8:1: error: VolumeFile: /Volumes/rad_cropped.tif is not there\n"})
-    EXPECT_NE(said.find(line), std::string::npos) << line << said;
+    EXPECT_HAS(said, line) << line << said;
   EXPECT_EQ(said.find("mc3"), std::string::npos) << said;
 }
 
@@ -217,9 +217,8 @@ TEST_F(ReadAutoscoper, TheMeshInTheCoordinatesOfTheVolume) {
         << expected.transpose();
   }
   std::filesystem::remove(folder / "Models/rad.ply");
-  EXPECT_NE(without_folder(shipped::refusal("read.autoscoper", {}, options), folder.path())
-                .find("trial.cfg:11:1: error: MeshFile: /Models/rad.ply is not there"),
-            std::string::npos);
+  EXPECT_HAS(without_folder(shipped::refusal("read.autoscoper", {}, options), folder.path()),
+             "trial.cfg:11:1: error: MeshFile: /Models/rad.ply is not there");
 }
 
 TEST_F(ReadAutoscoper, ATrackInAutoscopersCoordinatesAndBack) {

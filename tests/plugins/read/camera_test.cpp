@@ -129,7 +129,7 @@ TEST_F(ReadCamera, OwnYaml) {
   EXPECT_EQ(camera.camera_from_world.translation_mm.z(), 900);
   put(folder / "cam.yaml", kYaml + "radial_distortion: [0.5, 0, 0]\n");
   const auto said = said_by([&](const Context& context) { read(folder / "cam.yaml", context); });
-  EXPECT_NE(said.at(0).find("cam.yaml: the images of this camera are distorted"), std::string::npos);
+  EXPECT_HAS(said.at(0), "cam.yaml: the images of this camera are distorted");
   expect_faulty("cam.yaml", kYaml,
                 {{"target: camera", "target: detector",
                   "cam.yaml:6:11: camera_from_world: target: expected the frame 'camera', got 'detector'"},

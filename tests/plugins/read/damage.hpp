@@ -4,7 +4,6 @@
 // of memory and time, and must be read, or refused with a sentence that names the file.
 #include <sys/resource.h>
 #include <sys/wait.h>
-#include <unistd.h>
 
 #include <cstdio>
 #include <functional>
@@ -86,7 +85,7 @@ inline std::string refusal_within_limits(const std::function<void()>& read, cons
 #define EXPECT_REFUSED(read, file_name, text)                                                                \
   do {                                                                                                       \
     const std::string marrow_said = ::marrow::test::refusal_within_limits([&] { (void)(read); }, file_name); \
-    EXPECT_NE(marrow_said.find(text), std::string::npos) << "it said: " << marrow_said;                      \
+    EXPECT_HAS(marrow_said, text);                                                                           \
   } while (false)
 
 /// One thing that is wrong with a good file, and words of the refusal without the folder's name: all of them if they
@@ -109,7 +108,7 @@ inline void expect_faults(const std::filesystem::path& path, const std::string& 
     if (said.starts_with("/" + path.filename().string()))
       EXPECT_EQ(refusal, said);
     else
-      EXPECT_NE(refusal.find(said), std::string::npos) << "it said: " << refusal;
+      EXPECT_HAS(refusal, said);
   }
   put(path, good);
 }

@@ -2,9 +2,8 @@
 // Files of each format are cut off at random places, bytes of their headers are flipped, or their sizes are wrong. A
 // hundred copies of each must be read, or refused with an error that names the file, within 64 MB.
 #include "marrow/camera/points_file.hpp"
-#include "marrow/read/calibration_file.hpp"
+#include "marrow/read/camera_file.hpp"
 #include "marrow/toolbox/calibration/board.hpp"
-#include "marrow/toolbox/files/camera_file.hpp"
 #include "marrow/toolbox/files/mesh_file.hpp"
 #include "marrow/toolbox/files/volume_file.hpp"
 #include "marrow/toolbox/files/xray_header.hpp"

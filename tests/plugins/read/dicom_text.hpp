@@ -5,7 +5,6 @@
 #include <cstdint>
 #include <map>
 #include <sstream>
-#include <string>
 #include <vector>
 
 #include "tests/plugins/read/files.hpp"

@@ -1,14 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 // Temporary folders, parts of files, and messages for tests of readers and writers.
-#include <gtest/gtest.h>
 #include <unistd.h>
 
 #include <filesystem>
 #include <fstream>
-#include <string>
-
-#include "marrow/base/error.hpp"
 
 #include "tests/harness/message_of.hpp"
 

@@ -3,8 +3,7 @@
 // and right.
 #include <zlib.h>
 
-#include "marrow/domain/c_arm.hpp"
-#include "marrow/toolbox/files/image_sides.hpp"
+#include "marrow/toolbox/files/volume_file.hpp"
 #include "tests/plugins/read/dicom_text.hpp"
 #include "tests/plugins/read/itk_files.hpp"
 #include "tests/plugins/read/reading.hpp"
@@ -180,7 +179,7 @@ const std::string kDoubtOfFlip =
     "PatientOrientation (0020,0020) does not say how the patient lies in it; it may be mirrored: compare it with the "
     "anatomy, or mark landmarks in two views, and mirror the image if it is";
 
-TEST_F(ImageSides, NothingIsSaidWithoutAReason) {
+TEST_F(ImageSides, WithoutAReasonNothingIsSaidAndAFlipOrMissingAnglesAreOne) {
   EXPECT_EQ(said(fluoroscopy()), Doubts());
   EXPECT_EQ(said(but(fluoroscopy(), kFlipped)), Doubts()) << "the orientation is that of the image as it is stored";
   EXPECT_EQ(said(but(without(fluoroscopy(), {kOrientation}), {{kFlip, "CS:NO"}})), Doubts());
@@ -188,16 +187,10 @@ TEST_F(ImageSides, NothingIsSaidWithoutAReason) {
   put(folder / "a.png", "whatever");
   EXPECT_EQ(files::doubts_about_sides(folder / "a.png"), Doubts());
   EXPECT_EQ(files::doubts_about_sides(folder / "a.png", 0, camera_at(0, 0)), Doubts());
-}
-
-TEST_F(ImageSides, AFlipOfAnUnknownOrientation) {
   const Elements elements = but(without(fluoroscopy(), {kOrientation}), kFlipped);
   EXPECT_EQ(said(elements), Doubts{kDoubtOfFlip});
   EXPECT_EQ(said(elements, camera_at(0, 0)), Doubts{kDoubtOfFlip}) << "angles do not help where nothing is known";
   EXPECT_EQ(said(but(elements, {{kOrientation, "CS:X\\F"}})), Doubts{kDoubtOfFlip}) << "letters that nobody knows";
-}
-
-TEST_F(ImageSides, AnOrientationWithoutAngles) {
   EXPECT_EQ(said(without(fluoroscopy(), {kPrimary})),
             Doubts{"/a.dcm: the patient's right is on its right and the feet below (PatientOrientation (0020,0020)), "
                    "but the header does not say from where it was taken; whether it is mirrored is not known: compare "
@@ -220,10 +213,7 @@ TEST_F(ImageSides, ACameraOfAnglesDecides) {
   EXPECT_EQ(said(oriented("CS:L\\F"), camera_at(0, 180)), Doubts());
   EXPECT_EQ(said(oriented("CS:P\\F"), camera_at(0, 0)), Doubts())
       << "a side view is no mirrored frontal one: nothing is guessed";
-}
-
-// What read_image_file() mirrors back is no longer mirrored.
-TEST_F(ImageSides, WhatTheReaderMirrorsBackIsRight) {
+  // What read_image_file() mirrors back is no longer mirrored.
   const Elements elements = but(fluoroscopy(), {{kOrientation, "CS:L\\F"}});
   EXPECT_EQ(said(elements, camera_at(0, 0)), Doubts());
   EXPECT_EQ(said(elements, camera_at(0, 180)).size(), 1u) << "the case's angles contradict the header's";

@@ -3,8 +3,6 @@
 // Files written by ITK itself, so that the readers are tested on what another program made.
 #include <array>
 #include <cstdint>
-#include <filesystem>
-#include <string>
 #include <vector>
 
 #include "tests/plugins/read/files.hpp"

@@ -2,7 +2,6 @@
 // Surfaces in STL and PLY, and those that ask for more work than their size allows.
 #include <sys/stat.h>
 
-#include <cmath>
 #include <ctime>
 
 #include "marrow/runtime/node/abi.hpp"
@@ -127,7 +126,7 @@ TEST_F(ReadMesh, HeadersThatClaimTooMuchOrTooLittleAreRefused) {
                  {"", with(with(ply_text(), "uchar int", "uint uint"), "3 0 2 1", "nan 0 2 1"), few}});
 }
 
-TEST_F(ReadMesh, PlyElementsThatCannotBe) {
+TEST_F(ReadMesh, PlyElementsThatCannotBeAndListsThatAreTooLong) {
   const std::string head = "ply\nformat ascii 1.0\n", vertices = kPlyVertices;
   std::string many = head + vertices;
   for (int i = 0; i < 1500; ++i) many += "element nothing" + std::to_string(i) + " 60000\n";
@@ -143,13 +142,10 @@ TEST_F(ReadMesh, PlyElementsThatCannotBe) {
        {"", head + "element vertex -1\nend_header\n", count},
        {"", with(ply_text(), "end_header\n", strips) + "4 0 1 2 3\n",
         "has strips of triangles ('tristrips'), which are not read"}});
-}
-
-TEST_F(ReadMesh, PlyListsThatAreTooLong) {
-  const std::string head =
+  const std::string list_head =
       "ply\nformat binary_little_endian 1.0\nelement vertex 3\nproperty double x\nproperty double y\nproperty double "
       "z\nelement face 2\nproperty list ";
-  const auto faces = [&](const std::string& type) { return head + type + " vertex_indices\nend_header\n"; };
+  const auto faces = [&](const std::string& type) { return list_head + type + " vertex_indices\nend_header\n"; };
   std::vector<Fault> faults{
       {"", faces("float uchar") + std::string(200, '\0'), "expected 'property list WHOLE_NUMBER TYPE NAME'"}};
   for (const char* type : {"uint uchar", "int uchar", "uint double"})

@@ -1,10 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 // What the shipped readers make of files.
-#include <filesystem>
-#include <string>
 
-#include "marrow/domain/case.hpp"
 #include "shipped.hpp"
 
 namespace marrow::test {

@@ -3,7 +3,6 @@
 // other sizes or over each other, directories in a circle.
 #include <zlib.h>
 
-#include "marrow/domain/image.hpp"
 #include "marrow/toolbox/files/volume_file.hpp"
 #include "tests/plugins/read/damage.hpp"
 
@@ -104,7 +103,7 @@ class Tiff : public InAFolder {
 };
 
 // ImageJ keeps a CT, whose numbers have a sign, so.
-TEST_F(Tiff, ImageJsCalibrationIsApplied) {
+TEST_F(Tiff, ImageJsCalibrationIsAppliedAndOthersAreRefused) {
   const std::string ct = "ImageJ=1.53t\nimages=2\nslices=2\ncf=0\nc0=-32768.0\nc1=1.0\nvunit=gray value\n";
   EXPECT_EQ(volume(pages_of(2, ct)).values, (std::vector<float>{-31768, -31767, -30768, -30766}));
   EXPECT_EQ(volume(pages_of(2, "ImageJ=1.53t\nimages=2\ncf=0\nc0=0\nc1=1\n")).values[0], 1000);
@@ -112,9 +111,6 @@ TEST_F(Tiff, ImageJsCalibrationIsApplied) {
   ASSERT_EQ(second.type(), CV_32F);
   EXPECT_EQ(second.at<float>(0, 0), -900);
   EXPECT_EQ(second.at<float>(0, 1), -901);
-}
-
-TEST_F(Tiff, OtherCalibrationsOfImageJAreRefused) {
   const std::string start = "ImageJ=1.53t\nimages=2\nslices=2\n", line = start + "cf=0\nc0=1\nc1=2\n";
   for (const std::string function : {"1", "20", "21", "x"})
     expect_no_volume(pages_of(2, start + "cf=" + function + "\nc0=1\nc1=2\n"), "ImageJ's function " + function);
@@ -205,16 +201,13 @@ TEST_F(Tiff, OfOtherProgramsWhosePagesAreNoSlices) {
     EXPECT_EQ(volume(stack(slices)).grid.size, (std::array<int, 3>{2, 2, 2})) << slices;
 }
 
-TEST_F(Tiff, WhoseZeroIsWhite) {
+TEST_F(Tiff, WhoseZeroIsWhiteAndFieldsOfKindsThatAreNotRead) {
   const Fields white = but(page(2, 2), {{262, {0}}});
   EXPECT_EQ(volume(tiff(little(8, 4), {white, white})).values,
             (std::vector<float>{247, 255, 255, 255, 247, 255, 255, 255}));
   const Fields with_sign = but(white, {{339, {2}}});
   expect_no_volume(tiff(little(8, 4), {with_sign, with_sign}),
                    "its zero is white (PhotometricInterpretation WhiteIsZero)");
-}
-
-TEST_F(Tiff, FieldsOfKindsThatAreNotRead) {
   expect_no_volume(tiff(little(8, 4), {but(page(2, 2), {{339, {2, 2}}})}),
                    "is cut off or damaged: only 0 pages are whole (libtiff: Incompatible type for \"SampleFormat\")");
 }
@@ -230,17 +223,14 @@ TEST_F(Tiff, PagesOfDifferentSizes) {
   EXPECT_NO_THROW(volume(sizes(8, 8)));
 }
 
-TEST_F(Tiff, WhosePagesRunInACircle) {
+TEST_F(Tiff, WhosePagesRunInACircleOrShareTheirBytes) {
   const Fields one = page(2, 2);
   EXPECT_EQ(volume(tiff(little(8, 4), {one, one})).grid.size, (std::array<int, 3>{2, 2, 2}));
   expect_no_volume(tiff(little(8, 4), {one}, 0), "only 1 pages are whole (libtiff: TIFF directory 0 has IFD looping");
   expect_no_volume(tiff(little(8, 4), {one, one}, 0),
                    "only 2 pages are whole (libtiff: TIFF directory 1 has IFD looping");
-}
-
-// Small files must not take long. The pixels of all pages are the same 60000 bytes; so are the fields of the second
-// file, which are unknown and so read each time.
-TEST_F(Tiff, WhosePagesShareTheirBytes) {
+  // Small files must not take long. The pixels of all pages are the same 60000 bytes; so are the fields of the second
+  // file, which are unknown and so read each time.
   Fields fields = page(300, 200);
   for (const bool has_unknown : {false, true}) {
     for (int tag = 40000; has_unknown && tag < 40040; ++tag) fields[tag] = {8, 3, 30000};

@@ -12,14 +12,10 @@ namespace marrow::test::refine_cameras_test {
 inline List<View> views(int count = 2) {
   List<View> views;
   for (int i = 0; i < count; ++i) {
-    View view;
-    view.name = i == 0 ? "frontal" : "lateral";
-    view.camera.width_px = view.camera.height_px = 512;
-    view.camera.intrinsics << 1700, 0, 256, 0, 1700, 256, 0, 0, 1;
-    view.camera.camera_from_world.rotation = rotation_from_vector(i * kPi / 2 * Vector3d::UnitY());
-    view.camera.camera_from_world.translation_mm = Vector3d(0, 0, 600);
-    view.image.pixels = cv::Mat(512, 512, CV_16U, cv::Scalar(1000));
-    views.add(view.name, view);
+    Camera camera = before_origin(pinhole(1700, 512, 512, {{256, 256}}), 600);
+    camera.camera_from_world.rotation = rotation_from_vector(i * kPi / 2 * Vector3d::UnitY());
+    const std::string name = i == 0 ? "frontal" : "lateral";
+    views.add(name, view_of(name, camera, cv::Mat(512, 512, CV_16U, cv::Scalar(1000))));
   }
   return views;
 }
@@ -119,8 +115,7 @@ class SplitWithDerivatives : public SplitInViews {
 struct Bone {
   explicit Bone(const std::vector<RigidTransform>& motions, double information = 1e4, double at_mm = 40) {
     pose.frame.origin_mm = Vector3d(10, 0, 0);
-    pose.world_from_model.rotation = rotation_from_vector({0.3, -0.2, 0.5});
-    pose.world_from_model.translation_mm = Vector3d(0, at_mm, 0);
+    pose.world_from_model = placed({0, at_mm, 0}, {0.3, -0.2, 0.5});
     std::vector<RigidTransform> best;
     for (const RigidTransform& motion : motions) best.push_back(motion * pose.world_from_model);
     cost = std::make_shared<Split>(best, pose.frame, information);
@@ -130,11 +125,9 @@ struct Bone {
 };
 
 inline RigidTransform motion(const Vector3d& rotation_deg, const Vector3d& shift_mm) {
-  RigidTransform world_from_world{"world", "world"};
-  world_from_world.rotation = rotation_from_vector(radians(1) * rotation_deg);
-  world_from_world.translation_mm = shift_mm;
-  return world_from_world;
+  return {"world", "world", rotation_from_vector(radians(1) * rotation_deg), shift_mm};
 }
+const RigidTransform kNone = motion({0, 0, 0}, {0, 0, 0});
 
 inline Inputs inputs(const std::vector<Bone>& bones, const List<View>& of = views()) {
   List<Cost> costs;
@@ -143,7 +136,7 @@ inline Inputs inputs(const std::vector<Bone>& bones, const List<View>& of = view
     costs.add_shared(i ? "proximal" : "distal", bones[i].cost);
     poses.add(i ? "proximal" : "distal", bones[i].pose);
   }
-  return {{"views", shipped::list(of, "view")},
+  return {{"views", each_view(of)},
           {"costs", shipped::list(costs, "fragment")},
           {"poses", shipped::list(poses, "fragment")}};
 }

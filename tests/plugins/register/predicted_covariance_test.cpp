@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <Eigen/LU>
-#include <atomic>
 
 #include "bowl.hpp"
 #include "marrow/toolbox/search/predicted_covariance.hpp"
@@ -68,9 +67,8 @@ TEST(PredictedCovariance, OfOneOrTwoBlocksIsNotKnown) {
     });
     const auto of_few = predicted(cost);
     expect_unknown(of_few);
-    EXPECT_EQ(of_few.warnings(1e9, 1e9),
-              Strings{"all that the images say about the pose lies in one or two small parts "
-                      "of them, so its deviations are not known"});
+    EXPECT_EQ(of_few.warnings(1e9, 1e9), Strings{"all that the images say about the pose lies in one or two small "
+                                                 "parts of them, so its deviations are not known"});
   }
 }
 

@@ -3,10 +3,7 @@
 // coordinates.
 #include "marrow/toolbox/search/search.hpp"
 #include "bowl.hpp"
-#include "marrow/toolbox/search/compared.hpp"
-#include "marrow/toolbox/search/derivatives.hpp"
 #include "marrow/toolbox/search/predicted_covariance.hpp"
-#include "marrow/toolbox/search/scan.hpp"
 
 namespace marrow::test::search_test {
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // register.together on two bones that give way to each other: everything is known by hand.
 #include "bowl.hpp"
-#include "marrow/toolbox/match/among_others.hpp"
+#include "marrow/toolbox/match/bones_together.hpp"
 
 namespace marrow::test::together_test {
 

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 // Costs that can be computed by hand: a bowl about a pose, with or without waves.
-#include <mutex>
 
 #include "tests/harness/node_test.hpp"
 

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 // What a picture shows: colours of pixels, and texts. A text is compared with the same text drawn by the test.
-#include <opencv2/core.hpp>
 
 #include "marrow/toolbox/draw/canvas.hpp"
 #include "tests/harness/node_test.hpp"

@@ -1,15 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "plugins/segment/distance_regularised.cpp"
 
-#include "tests/plugins/segment/broken_tube.hpp"
+#include "tests/plugins/segment/phantom.hpp"
 
 namespace marrow::test::distance_regularised_test {
-
-TEST(DistanceRegularised, TwoFragmentsOneMillimetreApart) {
-  const bones::BrokenTube tube;
-  Context context;
-  bones::expect_both(tube, distance_regularised(tube.volume(), tube.seeds(), {}, context));
-}
 
 TEST(DistanceRegularised, ItsOwnRegularityKeepsTheSlopeNearOne) {
   const bones::BrokenTube tube;
@@ -34,14 +28,6 @@ TEST(DistanceRegularised, ItsOwnRegularityKeepsTheSlopeNearOne) {
         ++count;
       }
   EXPECT_NEAR(sum / count, 1, 0.25);
-}
-
-TEST(DistanceRegularised, GivesOnlyWantedFragments) {
-  const bones::BrokenTube tube;
-  Context context;
-  const auto fields = distance_regularised(tube.volume(), tube.seeds(false), {}, context);
-  ASSERT_EQ(fields.size(), 1u);
-  EXPECT_EQ(fields.name(0), "distal");
 }
 
 }  // namespace marrow::test::distance_regularised_test

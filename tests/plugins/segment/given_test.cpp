@@ -17,32 +17,15 @@ Distance cylinder(double radius_mm, const Vector3d& axis) {
 }
 
 Grid grid_of(const std::array<int, 3>& size, const Vector3d& spacing_mm, double turn_rad = 0) {
-  Grid grid;
-  grid.size = size;
-  grid.spacing_mm = spacing_mm;
-  grid.direction = Eigen::AngleAxisd(turn_rad, Vector3d(1, -2, 3).normalized()).toRotationMatrix();
-  const Vector3d middle = Vector3d(size[0] - 1, size[1] - 1, size[2] - 1) / 2;
-  grid.origin_mm = -(grid.direction * middle.cwiseProduct(spacing_mm));
-  return grid;
+  return analytic::grid_of(size, spacing_mm,
+                           Eigen::AngleAxisd(turn_rad, Vector3d(1, -2, 3).normalized()).toRotationMatrix());
 }
 
 Volume mask_of(const Grid& grid, const Distance& distance) {
-  Volume mask{grid, {}};
-  for (int z = 0; z < grid.size[2]; ++z)
-    for (int y = 0; y < grid.size[1]; ++y)
-      for (int x = 0; x < grid.size[0]; ++x)
-        mask.values.push_back(distance(grid.point_from_index(Vector3d(x, y, z))) < 0);
-  return mask;
+  return volume_by(grid, [&](const Vector3d& point) { return distance(point) < 0; });
 }
 
 SignedField field_by(const Inputs& inputs) { return output_list<SignedField>("segment.given", "field", inputs)[0]; }
-
-template <class T>
-Value one(const T& item) {
-  List<T> list;
-  list.add("bone", item);
-  return shipped::list(list, "fragment");
-}
 
 struct Errors {
   double mean_mm = 0, rms_mm = 0, worst_mm = 0;
@@ -83,7 +66,7 @@ class SmoothSurface : public testing::TestWithParam<Shape> {};
 /// Midway between voxels, as run.program_field puts it, the rms is 0.17 to 0.20 voxels and the worst 0.5.
 TEST_P(SmoothSurface, LiesWhereTheTruthIs) {
   const Shape& shape = GetParam();
-  const SignedField field = field_by({{"label", one(mask_of(shape.grid, shape.distance))}});
+  const SignedField field = field_by({{"label", per_fragment("bone", mask_of(shape.grid, shape.distance))}});
   const Errors errors = errors_of(field, shape.distance, shape.grid, 4);
   const double voxel_mm = std::cbrt(shape.grid.spacing_mm.prod());
   RecordProperty("mean_voxels", std::to_string(errors.mean_mm / voxel_mm));
@@ -114,7 +97,7 @@ TEST(Given, ALabelOnAnotherGridThanTheCt) {
   ct.values.assign(ct.grid.count(), 40);
   // Larger voxels, other axes, and cut to the bone with a margin of two voxels.
   const Grid grid = grid_of({21, 21, 21}, {1.4, 1.4, 1.4}, -0.9);
-  const SignedField field = field_by({{"volume", item(ct)}, {"label", one(mask_of(grid, ball))}});
+  const SignedField field = field_by({{"volume", item(ct)}, {"label", per_fragment("bone", mask_of(grid, ball))}});
   EXPECT_EQ(field.grid.size, ct.grid.size);
   EXPECT_EQ(field.grid.direction, ct.grid.direction);
   const Errors errors = errors_of(field, ball, ct.grid, 0);
@@ -126,16 +109,11 @@ TEST(Given, ALabelOnAnotherGridThanTheCt) {
 TEST(Given, ALabelThatEndsWithItsGridIsCutFlat) {
   const Distance shaft = cylinder(8, {0, 0, 1});
   const Grid grid = grid_of({24, 24, 21}, {1, 1, 1});  // z from -10 to 10
-  const SignedField field = field_by({{"label", one(mask_of(grid, shaft))}});
+  const SignedField field = field_by({{"label", per_fragment("bone", mask_of(grid, shaft))}});
   const Mesh mesh = output<Mesh>("mesh.marching_cubes", "mesh", {{"field", item(field)}});
   EXPECT_TRUE(is_closed(mesh));
-  double lowest = 0, highest = 0;
-  for (const Vector3d& vertex : mesh.vertices_mm) {
-    lowest = std::min(lowest, vertex.z());
-    highest = std::max(highest, vertex.z());
-  }
-  EXPECT_NEAR(lowest, -10.5, 1e-3);
-  EXPECT_NEAR(highest, 10.5, 1e-3);
+  EXPECT_NEAR(extent(mesh).min().z(), -10.5, 1e-3);
+  EXPECT_NEAR(extent(mesh).max().z(), 10.5, 1e-3);
 }
 
 /// The centre of every voxel stays on its side.
@@ -143,7 +121,7 @@ TEST(Given, NoVoxelChangesItsSide) {
   std::mt19937 random(5);
   Volume mask{grid_of({20, 18, 16}, {0.7, 0.9, 1.3}), {}};
   for (std::size_t i = 0; i < mask.grid.count(); ++i) mask.values.push_back(random() % 3 == 0);
-  const SignedField field = field_by({{"label", one(mask)}});
+  const SignedField field = field_by({{"label", per_fragment("bone", mask)}});
   for (int z = 0; z < 16; ++z)
     for (int y = 0; y < 18; ++y)
       for (int x = 0; x < 20; ++x)
@@ -157,7 +135,7 @@ TEST(Given, ASurfaceWithAndWithoutCt) {
   ct.values.assign(ct.grid.count(), 40);
   const double truth_mm3 = enclosed_volume_mm3(ball);
   for (const bool has_ct : {true, false}) {
-    Inputs inputs{{"surface", one(ball)}};
+    Inputs inputs{{"surface", per_fragment("bone", ball)}};
     if (has_ct) inputs["volume"] = item(ct);
     const Mesh found = output<Mesh>("mesh.marching_cubes", "mesh", {{"field", item(field_by(inputs))}});
     EXPECT_NEAR(enclosed_volume_mm3(found), truth_mm3, 0.005 * truth_mm3) << has_ct;
@@ -166,27 +144,28 @@ TEST(Given, ASurfaceWithAndWithoutCt) {
 
 TEST(Given, WhatWasSegmentedIsPassedOn) {
   SignedField field{grid_of({2, 2, 2}, {1, 1, 1}), {-1, 1, 1, 1, 1, 1, 1, 1}};
-  EXPECT_EQ(field_by({{"segmented", one(field)}}).values_mm, field.values_mm);
+  EXPECT_EQ(field_by({{"segmented", per_fragment("bone", field)}}).values_mm, field.values_mm);
 }
 
 TEST(Given, Faults) {
   const Mesh ball = analytic::mesh_of({{{0, 0, 0}, {8, 8, 8}}});
   const Volume mask = mask_of(grid_of({20, 20, 20}, {1, 1, 1}), sphere(8, kBeside));
-  const auto said = [](const Inputs& inputs) { return message_of([&] { field_by(inputs); }); };
+  const auto said = [](const Inputs& inputs) { return MESSAGE_OF(field_by(inputs)); };
   EXPECT_EQ(said({}), "nothing gives the fragments: neither a segmentation from seeds nor labels nor surfaces");
-  EXPECT_EQ(said({{"label", one(mask)}, {"surface", one(ball)}}),
+  EXPECT_EQ(said({{"label", per_fragment("bone", mask)}, {"surface", per_fragment("bone", ball)}}),
             "a fragment is given by a label or by a surface; got both");
   Mesh open = ball;
   open.triangles.pop_back();
-  EXPECT_EQ(said({{"surface", one(open)}}), "the surface of 'bone' is open, so it has no inside; close its holes");
+  EXPECT_EQ(said({{"surface", per_fragment("bone", open)}}),
+            "the surface of 'bone' is open, so it has no inside; close its holes");
   Volume elsewhere{grid_of({9, 9, 9}, {1, 1, 1}), std::vector<float>(729, 40)};
   elsewhere.grid.origin_mm += Vector3d(500, 0, 0);
-  EXPECT_EQ(said({{"volume", item(elsewhere)}, {"label", one(mask)}}),
+  EXPECT_EQ(said({{"volume", item(elsewhere)}, {"label", per_fragment("bone", mask)}}),
             "fragment 'bone' has no voxel of the CT: its label or surface lies elsewhere. Were they made from another "
             "scan, or is the surface in another unit or frame (RAS)?");
   Volume nothing = mask;
   nothing.values.assign(nothing.grid.count(), 0);
-  EXPECT_EQ(said({{"label", one(nothing)}}), "mask: no voxel is inside");
+  EXPECT_EQ(said({{"label", per_fragment("bone", nothing)}}), "mask: no voxel is inside");
 }
 
 }  // namespace marrow::test::given_test

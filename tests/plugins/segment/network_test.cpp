@@ -2,8 +2,7 @@
 // A network of one convolution is a soft threshold of the CT, so what it must find is known exactly.
 #include <tbb/global_control.h>
 
-#include "tests/plugins/segment/broken_tube.hpp"
-#include "tests/plugins/segment/segmented.hpp"
+#include "tests/plugins/segment/phantom.hpp"
 #include "tests/plugins/toolbox/network/written.hpp"
 
 namespace marrow::test::network_test {
@@ -83,8 +82,7 @@ TEST(SegmentNetwork, TakesNeighbouringSlicesInTheirOrder) {
   for (int z = 8; z < 14; ++z)
     for (int y = 4; y < 12; ++y)
       for (int x = 4; x < 12; ++x) volume.values[volume.grid.offset(x, y, z)] = 1100;
-  List<Seeds> seeds;
-  seeds.add("block", Seeds{"block", {volume.grid.point_from_index({8, 8, 10})}});
+  const List<Seeds> seeds = named("block", Seeds{"block", {volume.grid.point_from_index({8, 8, 10})}});
   const auto field = fields_of(above, volume, seeds)[0];
   for (int z = 0; z < 20; ++z) EXPECT_EQ(field.at(8, 8, z) < 0, z >= 7 && z < 13) << "slice " << z;
 }
@@ -95,9 +93,8 @@ TEST(SegmentNetwork, FragmentsMeetWhereTheNetworkIsLeastSure) {
   for (int z = 4; z < 36; ++z)
     for (int y = 3; y < 9; ++y)
       for (int x = 3; x < 9; ++x) volume.values[volume.grid.offset(x, y, z)] = z == 12 ? 900 : 1300;
-  List<Seeds> seeds;
-  seeds.add("low", Seeds{"low", {volume.grid.point_from_index({6, 6, 6})}});
-  seeds.add("high", Seeds{"high", {volume.grid.point_from_index({6, 6, 33})}});
+  const List<Seeds> seeds = named("low", Seeds{"low", {volume.grid.point_from_index({6, 6, 6})}}, "high",
+                                  Seeds{"high", {volume.grid.point_from_index({6, 6, 33})}});
   const auto fields = fields_of(Written(soft_threshold(), kSlices), volume, seeds);
   for (int z = 5; z < 35; ++z) {
     if (z == 12) continue;

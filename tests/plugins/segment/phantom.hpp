@@ -79,6 +79,13 @@ struct Accuracy {
   std::size_t points = 0;
 };
 
+/// A field is as good as this.
+inline void expect_within(const Accuracy& found, double least_dice, double most_bias_mm, double most_mean_mm) {
+  EXPECT_GT(found.dice, least_dice);
+  EXPECT_LT(std::abs(found.bias_mm), most_bias_mm);
+  EXPECT_LT(found.mean_mm, most_mean_mm);
+}
+
 /// Compares a field with the true signed distance: Dice over voxels, and the true distance of each point where the
 /// field's zero level crosses a grid edge, as far as `counts` says that the point counts.
 inline Accuracy compare(
@@ -122,4 +129,142 @@ inline Grid ct_grid(const std::array<int, 3>& size) {
   return grid_at(size, -Vector3d(size[0] - 1, size[1] - 1, size[2] - 1).cwiseProduct(spacing_mm) / 2, spacing_mm);
 }
 
+/// A hollow bone in two fragments, cut obliquely and possibly displaced.
+struct BrokenTube {
+  double gap_mm = 1;
+  /// Of the distal fragment, turned about the x axis at the cut and pushed aside, as fractures are.
+  double turned_deg = 0, aside_mm = 0;
+  Vector3d normal = Vector3d(0.35, 0.1, 1).normalized();
+
+  static double outer(const Vector3d& p) { return round_cone(p, {0, 0, -90}, {0, 0, 90}, 11, 13); }
+  static double inner(const Vector3d& p) { return round_cone(p, {0, 0, -90}, {0, 0, 90}, 6, 8); }
+  Vector3d in_distal(const Vector3d& p) const {
+    return Eigen::AngleAxisd(-turned_deg * M_PI / 180, Vector3d::UnitX()) * (p - Vector3d(0, aside_mm, 0));
+  }
+  double distance(const Vector3d& p, std::size_t fragment) const {
+    if (fragment == 0) return std::max(outer(p), 0.5 * gap_mm - normal.dot(p));
+    const Vector3d q = in_distal(p);
+    return std::max(outer(q), normal.dot(q) + 0.5 * gap_mm);
+  }
+  double hu(const Vector3d& p) const {
+    const double proximal = filled(distance(p, 0)), distal = filled(distance(p, 1));
+    const double canal = proximal * filled(inner(p)) + distal * filled(inner(in_distal(p)));
+    return 50 + 1250 * std::min(1.0, proximal + distal) - 1320 * std::min(1.0, canal);
+  }
+  Volume volume() const {
+    return scan(
+        ct_grid({44, 44, 72}), [this](const Vector3d& p) { return hu(p); }, 0.5, 30, 3);
+  }
+  List<Seeds> seeds(bool both_wanted = true) const {
+    List<Seeds> seeds;
+    const Eigen::AngleAxisd turn(turned_deg * M_PI / 180, Vector3d::UnitX());
+    const Vector3d aside(0, aside_mm, 0);
+    seeds.add("proximal", Seeds{"proximal", {{9.7, 0, 18}, {-9.7, 0, 18}}, both_wanted});
+    seeds.add("distal", Seeds{"distal", {turn * Vector3d(9.3, 0, -18) + aside, turn * Vector3d(-9.3, 0, -18) + aside}});
+    return seeds;
+  }
+  /// Dice of a fragment, and its wall's distance from the truth, away from the cut and from the volume's ends.
+  Accuracy compare(const List<SignedField>& fields, std::size_t fragment) const {
+    return bones::compare(
+        fields[fragment], [&](const Vector3d& p) { return distance(p, fragment); },
+        [&](const Vector3d& p) { return std::abs(normal.dot(p)) > 4 && std::abs(p.z()) < 33; });
+  }
+};
+
+inline std::size_t overlap(const List<SignedField>& fields) {
+  std::size_t both = 0;
+  for (std::size_t at = 0; at < fields[0].values_mm.size(); ++at)
+    both += fields[0].values_mm[at] < 0 && fields[1].values_mm[at] < 0;
+  return both;
+}
+
+/// Both fragments are there, apart from each other and as large as they are.
+inline void expect_both(const BrokenTube& tube, const List<SignedField>& fields) {
+  ASSERT_EQ(fields.size(), 2u);
+  EXPECT_EQ(overlap(fields), 0u);
+  for (std::size_t f = 0; f < 2; ++f) {
+    const Accuracy accuracy = tube.compare(fields, f);
+    EXPECT_GT(accuracy.dice, 0.97) << fields.name(f);
+    EXPECT_LT(std::abs(accuracy.bias_mm), 0.1) << fields.name(f);
+  }
+}
+
+/// The distal end of a femur, broken through its spongy bone with a gap of 1 mm: a scene that no single threshold
+/// segments. The shaft's cortex is thick and bright; towards the joint it thins out to less than a voxel over spongy
+/// bone of 280 HU, and the fracture's faces have no cortex at all.
+struct DistalEnd {
+  double gap_mm = 1, spongy_hu = 280, tissue_hu = 50, marrow_hu = -40;
+  Vector3d cut_normal = Vector3d(0.35, 0.15, 1).normalized(), cut_point{0, 0, -25};
+
+  /// Below zero in the bone, near its surface a distance: shaft, its flare and two condyles, blended over 6 mm.
+  double outline(const Vector3d& p) const {
+    const double shaft = round_cone(p, {0, 0, -20}, {2, 3, 140}, 17, 14),
+                 flare = round_cone(p, {0, 0, -62}, {0, 0, -10}, 25, 17.5);
+    const double medial = round_cone(p, {-20, -4, -66}, {-20, 10, -66}, 20, 19),
+                 lateral = round_cone(p, {20, -6, -65}, {20, 8, -64}, 19, 19);
+    return blend(blend(shaft, flare), blend(medial, lateral));
+  }
+  double over_cut_mm(const Vector3d& p) const { return cut_normal.dot(p - cut_point); }
+  /// Signed distance to the surface of the proximal (side 1) or the distal fragment (-1).
+  double distance(const Vector3d& p, int side) const {
+    return std::max(outer_distance(p), 0.5 * gap_mm - side * over_cut_mm(p));
+  }
+  double outer_distance(const Vector3d& p) const {
+    const double value = outline(p);
+    if (std::abs(value) > 3) return value;
+    Vector3d slope;
+    for (int k = 0; k < 3; ++k) {
+      const Vector3d step = 0.05 * Vector3d::Unit(k);
+      slope[k] = (outline(p + step) - outline(p - step)) / 0.1;
+    }
+    return value / std::max(slope.norm(), 0.3);
+  }
+
+  static double fade(double z, double low, double high) { return std::clamp((z - low) / (high - low), 0.0, 1.0); }
+  double hu(const Vector3d& p) const {
+    const double surface = outline(p), cortex_mm = 0.6 + 4.4 * fade(p.z(), -50, 40),
+                 cortex_hu = 1000 + 300 * fade(p.z(), -50, 0);
+    const double inside_hu = spongy_hu + (marrow_hu - spongy_hu) * fade(p.z(), 0, 35);
+    const double bone = filled(std::max(surface, 0.5 * gap_mm - std::abs(over_cut_mm(p)))),
+                 core = filled(surface + cortex_mm);
+    return tissue_hu + bone * (cortex_hu + core * (inside_hu - cortex_hu) - tissue_hu);
+  }
+  Volume scan_of(std::array<int, 3> size, double noise_hu) const {
+    return scan(
+        ct_grid(size), [this](const Vector3d& p) { return hu(p); }, 0.5, noise_hu, 5);
+  }
+  /// The fields of the proximal and of the distal fragment, away from the volume's end.
+  Accuracy compare(const List<SignedField>& fields, std::size_t fragment) const {
+    return bones::compare(
+        fields[fragment], [&](const Vector3d& p) { return distance(p, fragment == 0 ? 1 : -1); },
+        [](const Vector3d& p) { return p.z() < 90; });
+  }
+  List<Seeds> seeds() const {
+    return named("proximal", Seeds{"proximal", {{0, 0, -10}, {13, 1, 50}, {-12, 2, 50}}}, "distal",
+                 Seeds{"distal", {{-20, 0, -66}, {20, 0, -64}, {0, 0, -45}}});
+  }
+
+ private:
+  static double blend(double a, double b) {
+    const double overlap = std::max(6 - std::abs(a - b), 0.0) / 6;
+    return std::min(a, b) - overlap * overlap * 6 / 4;
+  }
+};
+
 }  // namespace marrow::test::bones
+
+namespace phantom = marrow::test::bones;
+
+namespace marrow::test::segmented {
+
+inline Inputs inputs(const Volume& volume, const List<Seeds>& seeds) {
+  return {{"volume", item(volume)}, {"seeds", shipped::list(seeds, "fragment")}};
+}
+
+/// The fields that a node gives.
+inline List<SignedField> fields(const std::string& node, const Volume& volume, const List<Seeds>& seeds,
+                                const Options& options = {}) {
+  return output_list<SignedField>(node, "field", inputs(volume, seeds), options);
+}
+
+}  // namespace marrow::test::segmented

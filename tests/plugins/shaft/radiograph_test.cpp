@@ -2,7 +2,6 @@
 // Shafts in radiographs, from edges as edges.adaptive_relaxation finds them.
 #include <chrono>
 #include <cstdio>
-#include <filesystem>
 #include <opencv2/imgcodecs.hpp>
 
 #include "tests/plugins/initial/tube.hpp"

@@ -15,11 +15,7 @@ class Shaft : public testing::TestWithParam<std::string> {
 };
 
 inline View empty_view(int size = 512) {
-  View view;
-  view.name = "frontal";
-  view.camera = radiograph::camera(0, size);
-  view.image.pixels = cv::Mat(size, size, CV_16U, cv::Scalar(1000));
-  return view;
+  return view_of("frontal", radiograph::camera(0, size), cv::Mat(size, size, CV_16U, cv::Scalar(1000)));
 }
 
 /// A view that is darker between two columns.

@@ -148,8 +148,8 @@ TEST(GradientProjection, SaysWhatIsEmptyAndIsTheWorst) {
   const auto made = cost(inputs());
   EXPECT_EQ(made->nothing_compared(shifted(1, 0, 0)), "");
   EXPECT_EQ(made->nothing_compared(shifted(0, 0, 500)),
-            "view 'frontal': no part of the bone that rays touch lies inside image and mask; "
-            "view 'lateral': no part of the bone that rays touch lies inside image and mask");
+            "view 'frontal': no part of the bone that rays touch lies inside image and mask; view 'lateral': no part "
+            "of the bone that rays touch lies inside image and mask");
   View even = view_of(0);
   for (const double grey : {30000, 20000}) {
     even.image.pixels.setTo(grey);

@@ -53,9 +53,9 @@ TEST(Others, OfOutlinesItIsSaidWhatIsMissing) {
   EXPECT_EQ(without("others"), "there are projectors of other fragments, but no poses; wire 'others'");
   EXPECT_EQ(without("other_outlines"),
             "there are poses of other fragments, but nothing draws them; wire 'other_projectors'");
-  EXPECT_EQ(refusal(kCorrelation, with(beside_outline(inputs()), {{"others", per_fragment("third", Pose())}})),
-            "other_outlines has the fragment 'other', but others has no pose of it; give the poses of the same "
-            "fragments");
+  EXPECT_EQ(
+      refusal(kCorrelation, with(beside_outline(inputs()), {{"others", per_fragment("third", Pose())}})),
+      "other_outlines has the fragment 'other', but others has no pose of it; give the poses of the same fragments");
 }
 
 TEST(Others, TheirEdgesDoNotCount) {

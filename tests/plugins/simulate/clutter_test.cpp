@@ -1,13 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // Bodies in the beam and in the CT, and the node that adds them.
-#include <marrow/domain/random.hpp>
 
 #include "marrow/simulate/knee.hpp"
 #include "marrow/simulate/solid.hpp"
 #include "marrow/simulate/surgery.hpp"
-#include "marrow/simulate/thigh.hpp"
-#include "marrow/toolbox/phantom/loft.hpp"
-#include "marrow/toolbox/phantom/materials.hpp"
 #include "tests/plugins/simulate/phantoms.hpp"
 
 namespace marrow::test::clutter_test {
@@ -158,7 +154,7 @@ TEST(SimulateClutter, WhatIsFixedToTheFragmentMovesWithIt) {
 }
 
 TEST(SimulateClutter, TheKneeHasTheFemursSizeAndNeitherTouchesIt) {
-  const ClutteredPhantom phantom = cluttered(broken(), {{"knee", std::string("usual")}});
+  const ClutteredPhantom phantom = cluttered(broken(), {{"knee", "usual"}});
   const phantom::DistalEnd end = phantom::distal_end(broken().bone.outer);
   EXPECT_NEAR(end.lateral_x, 1, 0);  // a left femur: its head points to the patient's right
   const RigidTransform bone_from_world = inverse(phantom.phantom.fragments[1].world_from_bone());
@@ -197,7 +193,7 @@ TEST(SimulateClutter, PlacesDependOnTheSeedAlone) {
       if (one.name == "plate") return one.surface.vertices_mm;
     return std::vector<Vector3d>();
   };
-  EXPECT_EQ(plate(cluttered(broken(), {{"plate", std::string("usual")}})), plate(usual()));
+  EXPECT_EQ(plate(cluttered(broken(), {{"plate", "usual"}})), plate(usual()));
 }
 
 TEST(SimulateClutter, ImagesAndCtAreTheSameAtAnyNumberOfThreads) {
@@ -282,7 +278,7 @@ TEST(SimulateClutter, MetalMakesStreaksBetweenItsPartsOnly) {
 TEST(SimulateClutter, BadInputIsExplained) {
   Phantom thin = broken();
   thin.bone.thigh_radius_mm = 0;
-  EXPECT_EQ(refusal("simulate.clutter", {{"phantom", item(thin)}}, {{"fat", std::string("mild")}}),
+  EXPECT_EQ(refusal("simulate.clutter", {{"phantom", item(thin)}}, {{"fat", "mild"}}),
             "simulate.clutter: fat, folds and vessels need soft tissue, but the bone has none; set thigh_radius_mm of "
             "the bone, or these three to 'off'");
   const auto refused = [](const Body& thing) {
@@ -304,7 +300,7 @@ TEST(SimulateClutter, APlateWithoutRoomIsLeftOutWithAWarning) {
   Heard heard;
   const Phantom low = fracture(femur({{"resolution_mm", 2.0}}), {{"height_fraction", 0.12}, {"obliquity_deg", 0.0}});
   const auto made = output<ClutteredPhantom>("simulate.clutter", "phantom", {{"phantom", item(low)}},
-                                             {{"plate", std::string("bad")}}, heard.context);
+                                             {{"plate", "bad"}}, heard.context);
   EXPECT_TRUE(made.bodies.empty());
   EXPECT_EQ(heard.lines, Strings{"the fracture is too near to the knee for a plate below it; it is left out"});
 }

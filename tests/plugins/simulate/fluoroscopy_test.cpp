@@ -98,8 +98,7 @@ TEST(SimulateFluoroscopy, TheTruthMapsALandmarkToWhereTheImageShowsIt) {
 
 TEST(SimulateFluoroscopy, NoiseIsPoissonAndDependsOnTheSeedAlone) {
   const Phantom phantom = whole(box_between({-10, -4, -10}, {10, 6, 10}));
-  FluoroscopyOptions options = ideal();
-  options.photons = 2000;
+  const FluoroscopyOptions options{.photons = 2000, .blur_px = 0, .scatter_to_primary = 0, .scatter_px = 70};
   const auto image = [&](std::uint64_t seed, std::size_t threads) {
     return with_threads(threads, [&] { return exposed(phantom, options, seed, 256); });
   };
@@ -144,12 +143,12 @@ TEST(SimulateFluoroscopy, BlurWidensAnEdgeByItsSpread) {
 TEST(SimulateFluoroscopy, BadInputIsExplained) {
   Phantom phantom = whole(box_between({-10, -4, -10}, {10, 6, 10}));
   phantom.fragments[0].world_from_ct.translation_mm = {0, -600, 0};
-  EXPECT_EQ(message_of([&] { exposed(phantom); }),
+  EXPECT_EQ(MESSAGE_OF(exposed(phantom)),
             "simulate.fluoroscopy: fragment 'whole' reaches to -4.000000 mm from the X-ray source; it must lie in "
             "front of the source, so check the camera's distances and the fragment's translation");
   phantom = whole(box_between({-10, -4, -10}, {10, 6, 10}));
   phantom.fragments[0].world_from_ct.rotation *= 2;
-  EXPECT_NE(message_of([&] { exposed(phantom); }), "");
+  EXPECT_NE(MESSAGE_OF(exposed(phantom)), "");
 }
 
 }  // namespace marrow::test::fluoroscopy_test

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "marrow/toolbox/track/sequence.hpp"
+#include "marrow/toolbox/track/track_state.hpp"
 #include "sequences.hpp"
 #include "tests/plugins/read/files.hpp"
 
@@ -84,8 +84,6 @@ class TrackPredict : public testing::Test {
   TrackPredict() {
     state.now.velocity_per_s = six(30, 0, 0, 60, 0, 0);
     state.now.covariance(0, 6) = state.now.covariance(6, 0) = 1e-3;
-    keyframe.rotation = rotation_from_vector({0.1, -0.7, 0.3});
-    keyframe.translation_mm = {1, -200, 3};
   }
   Outputs predicted(const AutoscoperTrack* keyframes, const Options& options = {}) const {
     Inputs inputs{{"state", item(state)}};
@@ -93,7 +91,7 @@ class TrackPredict : public testing::Test {
     return call("track.predict", inputs, options);
   }
   TrackState state = sequences::begin();
-  RigidTransform keyframe{"world", "ct"};
+  const RigidTransform keyframe = placed({1, -200, 3}, {0.1, -0.7, 0.3});
 };
 
 TEST_F(TrackPredict, AKeyframeTakesThePlaceOfThePrediction) {
@@ -168,8 +166,7 @@ TEST_F(TrackPredict, AKeyframeFindsALostBoneAgain) {
         keyframes.world_from_bone[6] = moved(truth, now.fragment, six(2, -2, 1, 2, 1, -2));
       now = output<TrackState>("track.predict", "state", {{"state", item(now)}, {"keyframes", item(keyframes)}});
       const auto measured = sequences::measured(truth, now, noise, random);
-      Pose pose;
-      pose.world_from_model = measured.world_from_model;
+      Pose pose = pose_of(measured.world_from_model);
       pose.frame = now.fragment;
       pose.covariance = measured.covariance;
       pose.cost = 0.2;

@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <filesystem>
 #include <fstream>
 
 #include "wells.hpp"
@@ -53,46 +52,34 @@ TEST(VerdictEvidence, SeesViewsThatPullApart) {
 
 TEST(VerdictEvidence, SaysHowFarTheOtherCostsPoseIs) {
   Trial trial;
-  Pose contour = trial.pose;
-  contour.world_from_model = trial.moved_by({0, 0, 7, 0, 0, 0});
-  trial.inputs["contour_pose"] = item(contour);
+  trial.inputs["contour_pose"] = item(trial.pose_moved_by({0, 0, 7, 0, 0, 0}));
   EXPECT_NEAR(figure(trial.verdict(), "contour_apart_deg"), 7, 1e-6);
-  contour.world_from_model = trial.moved_by({0, 0, 0, 3, 0, 4});
+  const Pose contour = trial.pose_moved_by({0, 0, 0, 3, 0, 4});
   trial.inputs["contour_pose"] = item(contour);
   EXPECT_NEAR(figure(trial.verdict(), "contour_apart_mm"), 5, 1e-6);
   // Without it, the stage 'first' takes its place.
-  List<Pose> stages;
-  stages.add("start", trial.pose);
-  stages.add("first", contour);
   trial.inputs.erase("contour_pose");
-  trial.inputs["stages"] = shipped::list(stages, "stage");
+  trial.inputs["stages"] = list(named("start", trial.pose, "first", contour), "stage");
   EXPECT_NEAR(figure(trial.verdict(), "contour_apart_mm"), 5, 1e-6);
 }
 
-/// An outline of two straight borders, each with an edge pixel beside each point.
-struct Borders : OutlineProjector {
-  std::vector<OutlinePoint> points;
-  std::vector<OutlinePoint> outline(const Camera&, const RigidTransform&, double) const override { return points; }
-};
-
 TEST(VerdictEvidence, MeasuresTheOutlineAgainstTheEdges) {
   Trial trial;
-  Borders borders;
-  List<EdgeMap> edges;
-  EdgeMap map;
-  map.width_px = map.height_px = 200;
-  // The right border lies 1 px off its edges on the upper half, and has none on the lowest tenth.
+  std::vector<OutlinePoint> borders;
+  EdgeMap map{200, 200, {}};
+  // Two straight borders with an edge pixel beside each point. The right one lies 1 px off its edges on the upper half,
+  // and has none on the lowest tenth.
   for (int v = 50; v < 150; ++v)
     for (const int side : {-1, 1}) {
       const float u = 99.5f + float(side) * 18;
-      borders.points.push_back({u, float(v), float(side), 0, {float(side) * 15, 0, float(v - 100)}});
+      borders.push_back({u, float(v), float(side), 0, {float(side) * 15, 0, float(v - 100)}});
       if (side > 0 && v >= 140) continue;
       const float off = side > 0 && v < 100 ? 1.f : 0.f;
       map.pixels.push_back({u + off, float(v), float(side), 0, 100});
     }
-  for (const char* name : {"frontal", "lateral"}) edges.add(name, map);
-  trial.inputs["edges"] = shipped::list(edges, "view");
-  trial.inputs["projector"] = Value::of<OutlineProjector>(std::make_shared<const Borders>(borders));
+  trial.inputs["edges"] = per_view("frontal", map, "lateral", map);
+  trial.inputs["projector"] =
+      function<OutlineProjector>(outline_of([=](const Camera&, const RigidTransform&, double) { return borders; }));
   const Verdict verdict = trial.verdict();
   // A pixel is 0.8 mm at 800 mm from the source; the bone is about 6 mm farther away.
   EXPECT_NEAR(figure(verdict, "outline_part_mm"), 0.8, 0.05);
@@ -106,23 +93,15 @@ TEST(VerdictEvidence, MeasuresTheOutlineAgainstTheEdges) {
 
 /// Everything below z = -40 mm of the model is bone.
 SignedField floor_of_bone() {
-  SignedField field;
-  field.grid.size = {3, 3, 3};
-  field.grid.spacing_mm = {100, 100, 100};
-  field.grid.origin_mm = {-100, -100, -100};
-  for (int z = 0; z < 3; ++z)
-    for (int i = 0; i < 9; ++i) field.values_mm.push_back(float(-100 + 100 * z + 40));
-  return field;
+  return field_by(grid_at({3, 3, 3}, Vector3d::Constant(-100), Vector3d::Constant(100)),
+                  [](const Vector3d& p) { return p.z() + 40; });
 }
 
 TEST(VerdictEvidence, SeesThatBonesIntersect) {
   Trial trial;
-  Pose other = trial.pose;
-  other.world_from_model = trial.moved_by({0, 0, 0, 0, 0, 6});  // its bone ends at z = -34, and the box at -50
-  List<Pose> others;
-  others.add("distal", trial.pose);
-  others.add("proximal", other);
-  trial.inputs["others"] = shipped::list(others, "fragment");
+  // The other bone ends at z = -34, and the box at -50.
+  const Pose other = trial.pose_moved_by({0, 0, 0, 0, 0, 6});
+  trial.inputs["others"] = per_fragment("distal", trial.pose, "proximal", other);
   trial.inputs["other_bones"] = per_fragment("proximal", floor_of_bone());
   EXPECT_NEAR(figure(trial.verdict(), "intersection_mm"), 16, 0.5);
   trial.inputs.erase("other_bones");
@@ -145,6 +124,9 @@ std::string model_of(double bias, const std::string& terms) {
   return "marrow-failure-model: 1\nrecord: made by hand\nbias: " + std::to_string(bias) +
          "\ndoubtful_above: 0.1\nwrong_above: 0.5\nterms:\n" + terms;
 }
+
+/// It alone trusts a pose without warnings.
+const std::string kTrusting = model_of(-9, "  - {figure: warnings, scale: 1, weight: 1, absent: 0}\n");
 
 TEST(VerdictEvidence, TheModelGivesTheProbability) {
   Trial trial;
@@ -175,16 +157,14 @@ TEST(VerdictEvidence, TheModelGivesTheProbability) {
 // 5 mm along each axis: most errors of such a pose are above 2 mm. The uncertainty comes from the cameras, not from the
 // search.
 TEST(VerdictEvidence, SaysWhatThePredictedDeviationsLeaveOpen) {
-  const ModelFile model(model_of(-9, "  - {figure: warnings, scale: 1, weight: 1, absent: 0}\n"));
+  const ModelFile model(kTrusting);
   Trial trial;
   const auto verdict_with = [&](double deviation_mm, bool is_refined) {
     Pose pose = trial.pose;
     pose.covariance.emplace(Matrix6d::Zero());
     pose.covariance->diagonal().tail<3>().setConstant(deviation_mm * deviation_mm);
     trial.inputs["pose"] = item(pose);
-    List<Pose> stages;
-    stages.add("last", trial.pose);
-    if (is_refined) trial.inputs["stages"] = shipped::list(stages, "stage");
+    if (is_refined) trial.inputs["stages"] = list(named("last", trial.pose), "stage");
     return trial.verdict(model.options());
   };
   const double unknown = std::numeric_limits<double>::infinity();
@@ -208,13 +188,9 @@ TEST(VerdictEvidence, SaysWhatThePredictedDeviationsLeaveOpen) {
 
 TEST(VerdictEvidence, APoseInAnotherBoneIsDoubtful) {
   Trial trial;
-  Pose other = trial.pose;
-  other.world_from_model = trial.moved_by({0, 0, 0, 0, 0, 6});
-  List<Pose> others;
-  others.add("proximal", other);
-  trial.inputs["others"] = shipped::list(others, "fragment");
+  trial.inputs["others"] = per_fragment("proximal", trial.pose_moved_by({0, 0, 0, 0, 0, 6}));
   trial.inputs["other_bones"] = per_fragment("proximal", floor_of_bone());
-  const ModelFile model(model_of(-9, "  - {figure: warnings, scale: 1, weight: 1, absent: 0}\n"));
+  const ModelFile model(kTrusting);
   Options options = model.options();
   const Verdict verdict = trial.verdict(options);
   EXPECT_EQ(verdict.judgement, Judgement::doubtful);
@@ -263,7 +239,7 @@ struct Blind : Cost {
 
 TEST(VerdictEvidence, APoseOfWhichTheImagesSayNothingIsWrong) {
   Trial trial;
-  const ModelFile model(model_of(-9, "  - {figure: warnings, scale: 1, weight: 1, absent: 0}\n"));
+  const ModelFile model(kTrusting);
   const auto verdict_on = [&](const std::string& said, const Options& options) {
     trial.inputs["cost"] = Value::of<Cost>(std::make_shared<const Blind>(said));
     return output<Verdict>("verdict.evidence", "verdict", trial.inputs, options);
@@ -281,13 +257,82 @@ TEST(VerdictEvidence, APoseOfWhichTheImagesSayNothingIsWrong) {
 }
 
 TEST(VerdictEvidence, DeviationsOfZeroAreNoKnowledge) {
-  const ModelFile model(model_of(-9, "  - {figure: warnings, scale: 1, weight: 1, absent: 0}\n"));
+  const ModelFile model(kTrusting);
   Trial trial;
   trial.pose.covariance.emplace(Matrix6d::Zero());
   trial.inputs["pose"] = item(trial.pose);
   const Verdict verdict = trial.verdict(model.options());
   EXPECT_EQ(verdict.judgement, Judgement::wrong);
   EXPECT_EQ(verdict.failure_probability, 1);
+}
+
+// The verdict depends on the pose, not on the way to it. The costs are wells about given poses, so the end of each
+// search is known.
+
+/// A failure model in which only the distance by contour and the number of warnings count.
+std::string by_contour(double bias) {
+  return model_of(bias,
+                  "  - {figure: contour_apart_deg, scale: 1, weight: 0.5, absent: 0}\n"
+                  "  - {figure: warnings, scale: 1, weight: 1, absent: 0}\n");
+}
+
+/// With a second cost that is least where the pose is turned by this angle about the long axis.
+Trial with_second_cost(double turned_deg) {
+  Trial trial;
+  trial.second.views = {{{trial.moved_by({0, 0, turned_deg, 0, 0, 0}), 0.9}},
+                        {{trial.moved_by({0, 0, turned_deg, 0, 0, 0}), 0.9}}};
+  trial.inputs["contour_cost"] = Value::of<Cost>(std::make_shared<const Wells>(trial.second));
+  return trial;
+}
+
+Value stages_by(const Trial& trial, double first_turned_deg) {
+  return list(named("first", trial.pose_moved_by({0, 0, first_turned_deg, 0, 0, 0}), "final", trial.pose), "stage");
+}
+
+TEST(SamePose, WhereTheFirstSearchEndedDoesNotCount) {
+  Trial trial = with_second_cost(1);
+  const ModelFile model(by_contour(-5));
+  trial.inputs["stages"] = stages_by(trial, 0);
+  const Verdict one = trial.verdict(model.options());
+  trial.inputs["stages"] = stages_by(trial, 9);
+  const Verdict other = trial.verdict(model.options());
+  EXPECT_EQ(hash_of(one), hash_of(other));
+  EXPECT_NEAR(figure(one, "contour_apart_deg"), 1, 0.05);
+}
+
+TEST(SamePose, ATenthOfADegreeIsTheSamePose) {
+  const ModelFile model(by_contour(-5));
+  Numbers found;
+  for (const double off : {-0.1, 0.0, 0.1}) {
+    Trial trial = with_second_cost(3);
+    trial.inputs["pose"] = item(trial.pose_moved_by({off, -off, off, 0.3 * off, 0, -0.3 * off}));
+    found.push_back(trial.verdict(model.options()).failure_probability);
+  }
+  // log odds -5 + 0.5 log(1 + 3): a tenth of a degree changes them by 0.5 * 0.1 / 4.
+  const double log_odds = -5 + 0.5 * std::log(4.0);
+  for (const double probability : found) EXPECT_NEAR(std::log(probability / (1 - probability)), log_odds, 0.03);
+}
+
+TEST(SamePose, APoseFromWhichASecondCostLeadsAwayAsFarAsAFailureIsDoubtful) {
+  Trial trial = with_second_cost(7.6);
+  const ModelFile model(by_contour(-9));  // it alone trusts the pose
+  const Verdict verdict = trial.verdict(model.options());
+  EXPECT_LT(verdict.failure_probability, 0.001);
+  EXPECT_EQ(verdict.judgement, Judgement::doubtful);
+  EXPECT_EQ(verdict.reasons.at(0),
+            "contour and grey values lead to poses 7.6 degrees apart about the long axis; both cannot be right");
+  EXPECT_EQ(verdict.remedies.at(0), "another view, or a landmark off the long axis");
+  EXPECT_EQ(with_second_cost(4).verdict(model.options()).judgement, Judgement::trusted);
+}
+
+TEST(SamePose, SoIsOneFromWhichItsOwnCostLeadsAway) {
+  Trial trial;
+  for (auto& view : trial.cost.views) view = {{trial.moved_by({0, 0, 0, 0, 0, 3}), 0.9}};
+  const ModelFile model(by_contour(-9));
+  const Verdict verdict = trial.verdict(model.options());
+  EXPECT_NEAR(figure(verdict, "apart_mm"), 3, 0.05);
+  EXPECT_EQ(verdict.judgement, Judgement::doubtful);
+  EXPECT_EQ(verdict.reasons.at(0), "the cost leads to a pose 3.00 mm away; both cannot be right");
 }
 
 }  // namespace marrow::test::evidence_test

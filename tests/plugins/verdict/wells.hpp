@@ -37,37 +37,35 @@ struct Wells : Cost {
 
 /// Looks along an axis of the world from 800 mm, with a detector behind it.
 inline View view_along(const std::string& name, const Vector3d& turn_deg) {
-  View view;
-  view.name = name;
-  view.camera.width_px = view.camera.height_px = 200;
-  view.camera.intrinsics << 1000, 0, 99.5, 0, 1000, 99.5, 0, 0, 1;
-  view.camera.camera_from_world = {"camera", "world", rotation_from_vector(radians(1) * turn_deg), Vector3d(0, 0, 800)};
-  view.image.pixels = cv::Mat(200, 200, CV_16UC1, cv::Scalar(1000));
-  return view;
+  Camera camera = before_origin(pinhole(1000, 200, 200), 800);
+  camera.camera_from_world.rotation = rotation_from_vector(radians(1) * turn_deg);
+  return view_of(name, camera, cv::Mat(200, 200, CV_16UC1, cv::Scalar(1000)));
 }
 
 struct Trial {
   Wells cost, second;  ///< `second` is for a test to use
   Pose pose;
   Inputs inputs;
-  List<View> views;
+  List<View> views = views_named(view_along("frontal", {0, 0, 0}), view_along("lateral", {0, 90, 0}));
 
   Trial() {
-    pose.world_from_model.rotation = rotation_from_vector({0.1, 0.3, -0.2});
-    pose.world_from_model.translation_mm = {4, -3, 6};
+    pose.world_from_model = placed({4, -3, 6}, {0.1, 0.3, -0.2});
     pose.frame = cost.frame;
     cost.views = {{{pose.world_from_model, 0.9}}, {{pose.world_from_model, 0.9}}};
-    views.add("frontal", view_along("frontal", {0, 0, 0}));
-    views.add("lateral", view_along("lateral", {0, 90, 0}));
     inputs = {{"pose", item(pose)},
               {"optimizer", call("optimizer.bobyqa", {}).at("optimizer")},
-              {"views", shipped::list(views, "view")},
+              {"views", each_view(views)},
               {"model", item(box())}};
   }
   RigidTransform moved_by(const std::array<double, 6>& deg_and_mm) const {
     Vector6d motion = Vector6d::Map(deg_and_mm.data());
     motion.head<3>() *= radians(1);
     return moved(pose.world_from_model, cost.frame, motion);
+  }
+  Pose pose_moved_by(const std::array<double, 6>& deg_and_mm) const {
+    Pose moved = pose;
+    moved.world_from_model = moved_by(deg_and_mm);
+    return moved;
   }
   Verdict verdict(const Options& options = {}) {
     inputs["cost"] = Value::of<Cost>(std::make_shared<const Wells>(cost));

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 // Atomic writing when memory runs out, at each allocation in turn.
-#include <gtest/gtest.h>
 
 #include <cstdlib>
 #include <new>

@@ -3,8 +3,6 @@
 // be written.
 #include "plugins/write/case.cpp"
 
-#include <gtest/gtest.h>
-
 #include "tests/plugins/read/files.hpp"
 #include "tests/plugins/read/reading.hpp"
 #include "tests/plugins/write/example_case.hpp"
@@ -12,8 +10,7 @@
 
 namespace {
 
-using example_case::example;
-using example_case::example_view;
+using example_case::example, example_case::example_view;
 using marrow::test::case_at;
 using WriteCase = marrow::test::InAFolder;
 using writing::write;

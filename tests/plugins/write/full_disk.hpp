@@ -38,7 +38,7 @@ void expect_full_disk_is_diagnosed(const TemporaryFolder& folder, const std::str
     const FullDisk full(bytes);
     message = message_of([&] { write(path.string()); });
   }
-  EXPECT_NE(message.find(path.string() + ": cannot be written"), std::string::npos) << "it said: " << message;
+  EXPECT_HAS(message, path.string() + ": cannot be written");
   EXPECT_EQ(message.find(".tmp-"), std::string::npos) << message;
   EXPECT_EQ(bytes_of(path), "what was there before");
   for (const auto& entry : std::filesystem::directory_iterator(folder.path())) EXPECT_EQ(entry.path(), path);

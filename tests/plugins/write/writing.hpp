@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 // Writes values by the shipped writers of their types, as a run does with the outputs of its pipeline.
-#include <filesystem>
 #include <marrow/runtime/node/types.hpp>
 #include <marrow/runtime/plugins/catalogue.hpp>
 

@@ -8,11 +8,8 @@
 // displacement. `text` is what a node makes of it: "1.25 mm", "nan", "absent" (the figure is not there), "fail",
 // "crash"; "doubtful 7" for a verdict, whose percentage may be missing; the evaluations of a pose, from which its place
 // and its predicted deviations follow.
-#include <cmath>
 #include <cstdlib>
 #include <fstream>
-#include <limits>
-#include <map>
 #include <sstream>
 
 #include <marrow/plugin.hpp>

@@ -28,9 +28,7 @@ def run_in_cluster():
         os.environ["CLUSTER_MEMORY"] = "1"
     folder = tempfile.mkdtemp(prefix="marrow-cluster-")
     try:
-        return subprocess.run(
-            [SOURCE / "tools" / "checks" / "cluster_test", folder, sys.executable, *sys.argv]
-        ).returncode
+        return subprocess.run([SOURCE / "tools/checks/cluster_test", folder, sys.executable, *sys.argv]).returncode
     finally:
         shutil.rmtree(folder, ignore_errors=True)
 

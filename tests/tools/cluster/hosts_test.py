@@ -157,9 +157,7 @@ class HostsTest(unittest.TestCase):
         names = ["v%d/seed-%d/0" % (v, c) for c in range(1, CASES + 1) for v in range(VARIANTS)]
         hosts = [Host(name, self.scratch, self.shared, self.options) for name in HOSTS]
         # The variants of one case are on different hosts, and start together.
-        threads = [
-            threading.Thread(target=host.cells, args=(names[i :: len(hosts)], i)) for i, host in enumerate(hosts)
-        ]
+        threads = [threading.Thread(target=one.cells, args=(names[i :: len(hosts)], i)) for i, one in enumerate(hosts)]
         for thread in threads:
             thread.start()
         for thread in threads:
@@ -200,9 +198,8 @@ class HostsTest(unittest.TestCase):
         collect = ["cache", "gc", "--shared", "--keep-gb", "1"]
 
         def collected_by(host):
-            return subprocess.run(
-                [*host.command, str(MARROW), *collect], env=host.environment, capture_output=True, text=True
-            )
+            command = [*host.command, str(MARROW), *collect]
+            return subprocess.run(command, env=host.environment, capture_output=True, text=True)
 
         self.assertEqual(collected_by(hosts[0]).returncode, 0)
         hosts[0].cell("v0/seed-1/0", False)

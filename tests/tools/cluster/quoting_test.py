@@ -10,18 +10,8 @@ import subprocess
 import sys
 import unittest
 
-from cluster_cases import (
-    CAN_START_CLUSTER,
-    IN_A_CLUSTER,
-    MARROW,
-    PIPELINE,
-    TEST_PLUGINS,
-    Cluster,
-    is_idle,
-    main,
-    run_in_cluster,
-    wait_until,
-)
+from cluster_cases import CAN_START_CLUSTER, IN_A_CLUSTER, MARROW, PIPELINE, TEST_PLUGINS, Cluster, is_idle, main
+from cluster_cases import run_in_cluster, wait_until
 
 NAMES = {
     "a blank": "a b",
@@ -103,9 +93,8 @@ class Quoting(Cluster):
         return place
 
     def compare_here(self, *arguments, out=None, code=0, **environment):
-        return self.run_program(
-            self.program, "compare", self.file, "--out", out or self.out, *arguments, code=code, **environment
-        )
+        words = ("compare", self.file, "--out", out or self.out, *arguments)
+        return self.run_program(self.program, *words, code=code, **environment)
 
     def command(self, program, *arguments):
         said = self.compare_here("--emit", program, *arguments).stdout
@@ -217,9 +206,8 @@ class OneMachine(Quoting):
         self.write(file, "\n".join([lines[0][:-20], *lines[1:]]))
         self.write(self.out / "rows" / (names[1] + ".host.part"), "")
         said = self.compare_here("--gather", "--quiet", code=1).stderr
-        self.assertIn(
-            "rows/%s.jsonl has no undamaged row of it with its case and plugins as they are now" % names[0], said
-        )
+        lacks = "rows/%s.jsonl has no undamaged row of it with its case and plugins as they are now"
+        self.assertIn(lacks % names[0], said)
         self.assertIn("its task ended before it left its row, or it runs still", said)
         self.assertIn("%d of %d %s" % (len(VARIANTS) + 1, CELLS, LOST), said)
 

@@ -10,17 +10,8 @@ import subprocess
 import sys
 import time
 
-from cluster_cases import (
-    CAN_START_CLUSTER,
-    CASES,
-    IN_A_CLUSTER,
-    VARIANTS,
-    Cluster,
-    is_idle,
-    main,
-    run_in_cluster,
-    wait_until,
-)
+from cluster_cases import CAN_START_CLUSTER, CASES, IN_A_CLUSTER, VARIANTS, Cluster, is_idle, main, run_in_cluster
+from cluster_cases import wait_until
 
 PROFILE = "marrow-cluster: 1\nprocessors: 1\ntries: 3\nask_every_s: 2\n"
 ONE_TRY = PROFILE.replace("tries: 3", "tries: 1")

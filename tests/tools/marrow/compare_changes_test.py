@@ -36,10 +36,7 @@ HEAD = "experiment: 1\npipeline: p.yaml\ncases: {folders: [cases/*]}\n" + METRIC
 
 class Changes(Compared):
     pipeline, cases, variants = PIPELINE, "1", "{a: {}, b: {s.value: 0.1}}"
-
-    def setUp(self):
-        super().setUp()
-        self.write("other.txt", "one")
+    files = {"other.txt": "one"}
 
     def experiment(self, name, variants, head=HEAD):
         return super().experiment(name, variants, head)

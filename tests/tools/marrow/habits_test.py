@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """What people expect of any command line: short options, a dry run, the standard input, JSON, and columns that wrap."""
+import json
 import os
 import re
 import subprocess
 
 from harness import MARROW, SOURCE, TEST_PLUGINS
-from harness.program import Case, main
+from harness.program import Case, SharedCase, main
 from harness.terminal import Terminal
 
 PIPELINE = """marrow: 1
@@ -19,9 +20,7 @@ outputs: {total: sum, number: first}
 
 
 class Habits(Case):
-    def setUp(self):
-        super().setUp()
-        self.write("p.yaml", PIPELINE)
+    files = {"p.yaml": PIPELINE}
 
     def test_version(self):
         version = re.search(r"project\(marrow VERSION ([0-9.]+)", (SOURCE / "CMakeLists.txt").read_text()).group(1)
@@ -182,6 +181,180 @@ class Habits(Case):
             self.assertEqual(self.in_terminal(columns, "plan", "p.yaml").splitlines()[:2], [first, second])
         wrapped = "  --shared                    of the shared store, instead\n" + 30 * " " + "of this host's\n"
         self.assertIn(wrapped, self.in_terminal(60, "cache", "gc", "--help"))
+
+
+# What is printed: no text of a file commands the terminal, and what cannot be printed is said.
+ESCAPE = "\x1b[2J\x1b]0;owned\x07\nmarrow: forged"
+BAD = ("\x1b", "\x07", "\x9b", "\u202e", "\nmarrow: forged")
+NAMES = """marrow: 1
+nodes:
+  s: {uses: test.sides, with: {names: [%s, %s]}}
+  w: {uses: test.work, with: {value: 0.3}, in: {after: s.both}}
+  f: {uses: test.fail_above, in: {a: s.both}, with: {value: 10}}
+outputs: {o: f, w: w}
+"""
+# YAML itself lets no escape sequence through, but these it does.
+FAULTY = """marrow: 1
+"k\\e[2J": 1
+nodes:
+  c: {uses: "u\\e[31m", with: {"o\\e": 1}}  # \u009b31m \u202e
+outputs: {"o\\e": "r\\e"}
+"""
+WORK = """marrow: 1
+inputs: {x: {type: path}}
+nodes:
+  w: {uses: test.work, with: {value: 0.01, path: $x}}
+outputs: {o: w}
+"""
+MARKS = """marrow: 1
+name: 'a"b'
+nodes:
+  'c"; x': {uses: test.constant}
+  s: {uses: test.sides, with: {names: ['</script><script>alert(1)</script>', b]}}
+outputs: {'o"': 'c"; x', s: s.both}
+"""
+
+
+class Printed(Case):
+    def told(self, *arguments, code=None):
+        """All that a call prints, which commands nothing."""
+        result = self.marrow(*arguments)
+        self.assertIn(result.returncode, (0, 1, 2) if code is None else (code,), arguments)
+        for bad in BAD:
+            self.assertNotIn(bad, result.stdout + result.stderr, arguments)
+        return result.stdout + result.stderr
+
+    def test_no_name_commands_the_terminal(self):
+        self.write("p.yaml", NAMES % (json.dumps(ESCAPE), json.dumps("\x9b31m\u202e")))
+        told = self.told("run", "p.yaml", "--out", "a")
+        self.assertIn("f (\\x1b[2J\\x1b]0;owned\\x07\\x0amarrow: forged)", told)
+        for arguments in (
+            ["diff", "a", "a"],
+            ["rerun", "a", "--out", "b"],
+            ["graph", "p.yaml"],
+            ["plan", "p.yaml"],
+            ["show", "a"],
+            ["run", "p.yaml", "--out", "c", "--set", "f.in.a=s." + ESCAPE],
+            ["inspect", ESCAPE],
+            ["list", ESCAPE],
+        ):
+            self.told(*arguments)
+        for log in ("a/log.txt", "b/log.txt"):
+            text = self.read(log)
+            self.assertEqual([bad for bad in BAD if bad in text], [], log)
+        self.assertRegex(text, r"w \(\\u009b31m\\u202e\): \d")
+
+    def test_nor_does_a_faulty_file(self):
+        self.write("p.yaml", FAULTY)
+        said = self.told("check", "p.yaml", code=2)
+        self.assertIn("the key 'k\\x1b[2J' in the pipeline holds a control character", said)
+        self.assertIn("# \\u009b31m \\u202e", said, "the line as it is quoted")
+        for arguments in (["run", "p.yaml", "--set", "c.value=\x1b[2J"], ["check", "p.yaml", "\x1b[2J=1"]):
+            self.told(*arguments, code=2)
+        self.told("check", "\x1b[2J.yaml", code=2)
+        as_json = json.loads(self.expect(2, "check", "--json", "p.yaml").stdout)
+        self.assertIn("k\x1b[2J", as_json[0]["message"], "JSON has escapes of its own")
+
+    def test_nor_does_an_argument_or_a_folder(self):
+        name = "a" + ESCAPE.replace("/", "") + "\u202e"
+        self.write(name, "x")
+        self.write("p.yaml", WORK)
+        self.environment = {"MARROW_CACHE": str(self.scratch / "cache\x1b[2J")}
+        self.expect(0, "run", "p.yaml", "x=" + name, "--out", "o")
+        key = self.nodes("o")["w"]["keys"]["number"]
+        self.plugins = [TEST_PLUGINS, "/nowhere" + ESCAPE]
+        for code, *arguments in (
+            [0, "cache", "info"],
+            [0, "cache", "why", key],
+            [2, "cache", "why", ESCAPE],
+            [2, "cache", "gc", "--keep-gb", ESCAPE],
+            [2, "run", "p.yaml", "--threads", ESCAPE],
+            [2, "run", "p.yaml", "--seed", ESCAPE],
+            [2, "run", "p.yaml", "--" + ESCAPE],
+            [0, "doctor"],
+        ):
+            self.assertIn("\\x1b[2J", self.told(*arguments, code=code), arguments)
+
+    def test_names_in_dot_files_and_pages_are_names(self):
+        self.write("p.yaml", MARKS)
+        dot = self.printed("graph", "--dot", "p.yaml")
+        self.assertIn('digraph "a\\"b" {', dot)
+        self.assertIn('  "c\\"; x" [label="c\\"; x\\ntest.constant", tooltip="p.yaml:4"];', dot)
+        self.expect(0, "run", "p.yaml", "--out", "a", "--quiet")
+        self.expect(0, "show", "a")
+        self.assertNotIn("<script>alert", self.read("a/report.html"))
+        column = self.page_data("a/report.html")["figures"][-1]["columns"][0]
+        self.assertEqual(column, "<%2Fscript><script>alert(1)<%2Fscript>")
+
+    def test_what_cannot_be_printed_is_said(self):
+        with open("/dev/full", "w") as full:
+            result = subprocess.run([str(MARROW), "list"], stdout=full, stderr=subprocess.PIPE, text=True)
+        self.assertIn(result.returncode, (1, 2))
+        said = "marrow: error: what was to be printed could not be written; is the disk full?\n"
+        self.assertEqual(result.stderr, said)
+
+
+# The log of a run: levels on the terminal, every line in the file, events as JSON.
+PIPELINE_OF_LOG = """marrow: 1
+nodes:
+  c: {uses: test.constant}
+  w: {uses: test.warn}
+  s: {uses: test.say}
+  f: {uses: test.fail_above, in: {a: c}, with: {value: -1}}
+outputs: {c: c, w: w, s: s, f: f}
+"""
+LINE = re.compile(r"\d{4}-\d{2}-\d{2} \d{2}:\d{2}:\d{2}\.\d{3} \[(debug|info|warning|error)\] (.*)")
+
+
+class Log(SharedCase):
+    def make(self):
+        self.write("p.yaml", PIPELINE_OF_LOG)
+        self.runs = {}
+
+    def run_with(self, *arguments):
+        """The run with these options, and the lines of its log as (level, text). Each is made once."""
+        if arguments not in self.runs:
+            out = "out-%d" % len(self.runs)
+            result = self.expect(1, "run", "p.yaml", "--out", out, "--no-cache", *arguments)
+            lines = [LINE.fullmatch(line) for line in self.read(out + "/log.txt").splitlines()]
+            self.assertNotIn(None, lines)
+            self.runs[arguments] = result, [line.groups() for line in lines]
+        return self.runs[arguments]
+
+    def test_the_least_level_that_is_shown(self):
+        wanted = {"debug": "a trifle", "info": "a word", "warning": "warning: mind the gap", "error": "error: "}
+        names = list(wanted)
+        for least in (None, *names, "quiet"):
+            shown = self.run_with(*(["--quiet"] if least == "quiet" else ["--log-level", least] if least else []))[0]
+            first = names.index({None: "info", "quiet": "error"}.get(least, least))
+            for i, name in enumerate(names):
+                check = self.assertIn if i >= first else self.assertNotIn
+                check(wanted[name], shown.stderr, (least, name))
+
+    def test_the_file_has_every_line_with_level_and_node(self):
+        lines = self.run_with("--quiet")[1]
+        for line in (("debug", "s: a trifle"), ("info", "s: a word"), ("warning", "w: mind the gap")):
+            self.assertIn(line, lines)
+        (error,) = (text for level, text in lines if level == "error")
+        self.assertIn("node 'f'", error)
+
+    def test_as_json(self):
+        result = self.run_with("--json")[0]
+        events = [json.loads(line) for line in result.stdout.splitlines() if line.startswith('{"event"')]
+        events = [event for event in events if event["event"] in ("message", "warning")]
+        said = {(event["node"], event.get("level"), event["text"]) for event in events}
+        self.assertEqual(said, {("s", "debug", "a trifle"), ("s", "info", "a word"), ("w", "warning", "mind the gap")})
+
+    def test_an_unknown_level(self):
+        self.refused(["--log-level", "loud"], "run", "p.yaml", "--log-level", "loud")
+
+    def test_colours_on_a_terminal_only(self):
+        self.assertNotIn("\x1b[", self.run_with()[0].stderr)
+        environment = {**os.environ, "MARROW_PLUGIN_PATH": str(TEST_PLUGINS), "TERM": "xterm"}
+        command = [MARROW, "run", "p.yaml", "--out", "coloured", "--no-cache"]
+        with Terminal(command, cwd=self.scratch, environment=environment) as terminal:
+            self.assertRegex(terminal.to_the_end(), r"\x1b\[33m[^\n]*mind the gap")
+        self.assertNotIn("\x1b", self.read("coloured/log.txt"))
 
 
 if __name__ == "__main__":

@@ -1,13 +1,15 @@
 # SPDX-License-Identifier: Apache-2.0
 """Libraries that are refused, and what becomes of one that marrow does not know yet."""
+import gzip
 import json
 import os
 import resource
 import shutil
 import socket
+import subprocess
 
 from harness import BUILD, SOURCE, TEST_PLUGINS
-from harness.program import Case, main
+from harness.program import Case, main, marrow, SharedCase
 
 BAD = BUILD / "tests" / "bad_plugins"
 REFUSED = {
@@ -155,6 +157,141 @@ class Plugins(Case):
             (limited.returncode, said), (2, "marrow: error: cannot write %s: File too large\n" % self.manifest)
         )
         self.assertEqual([path.name for path in self.folder.iterdir()], [self.library.name])
+
+
+# Nodes that are not there: options of CMake leave out those of large libraries, and a method may be a choice of another
+# node.
+PIPELINE_OF_BUILT = """marrow: 1
+nodes:
+  surface: {uses: %s}
+outputs: {surface: surface}
+"""
+# A project that adds plugins as marrow does. Those of options that are off are no targets, so it needs no compiler.
+PROJECT = """cmake_minimum_required(VERSION 3.25)
+project(plugins LANGUAGES NONE)
+include(%s/framework/cmake/MarrowPlugin.cmake)
+set(MARROW_LEFT_OUT OFF)
+foreach(name ${LEFT_OUT})
+  marrow_add_plugin(${name} ${name}.cpp $<TARGET_OBJECTS:nothing> ONLY_WITH MARROW_CAD LINK absent)
+endforeach()
+marrow_write_not_built(${CMAKE_BINARY_DIR}/not_built.json)
+"""
+
+
+class NotBuilt(Case):
+    @classmethod
+    def setUpClass(cls):
+        cls.folder = cls.shared_folder()
+        cls.plugins = [cls.folder]
+        # The second one is there after all, from another folder.
+        nodes = {"mesh.voronoi": "MARROW_CAD", "mesh.marching_cubes": "MARROW_CAD"}
+        (cls.folder / "not_built.json").write_text(json.dumps(nodes))
+
+    def fault(self, node):
+        result = self.marrow("check", self.write("p.yaml", PIPELINE_OF_BUILT % node))
+        self.assertEqual(result.returncode, 2)
+        (error,) = [line.split("error: ")[1] for line in result.stderr.splitlines() if "error: " in line]
+        (hint,) = [line.strip() for line in result.stderr.splitlines() if line.strip().startswith("hint: ")]
+        return error, hint
+
+    def test_a_pipeline_with_one_names_the_option(self):
+        self.assertEqual(
+            self.fault("mesh.voronoi"),
+            (
+                "unknown node 'mesh.voronoi'",
+                "hint: this build of marrow leaves it out; configure it with -DMARROW_CAD=ON",
+            ),
+        )
+
+    def test_other_commands_say_the_same(self):
+        for command, what in (("inspect", "node"), ("conformance", "node, kind or library")):
+            told = self.marrow(command, "mesh.voronoi").stderr
+            start = "marrow: error: there is no %s 'mesh.voronoi'; " % what
+            self.assertTrue(told.startswith(start + "this build of marrow leaves it out; configure it with -D"), told)
+
+    def test_doctor_lists_them(self):
+        told = self.marrow("doctor")
+        self.assertEqual(told.returncode, 0, told.stdout)
+        self.assertIn(
+            "\n\nNot built (configure marrow with the option to have them):\n  mesh.voronoi: MARROW_CAD\n\n",
+            told.stdout,
+        )
+        listed = json.loads(self.marrow("doctor", "--json").stdout)
+        self.assertEqual(listed["not_built"], [{"node": "mesh.voronoi", "option": "MARROW_CAD"}])
+
+    def test_what_is_no_such_list_tells_nothing(self):
+        file = self.scratch / "not_built.json"
+        for text in ("", "[1]", '"mesh.voronoi"', '{"mesh.voronoi": 1}'):
+            file.write_text(text)
+            told = json.loads(self.marrow("doctor", "--json", plugins=[self.scratch]).stdout)
+            self.assertEqual(told["not_built"], [], text)
+        file.unlink()
+        file.mkdir()
+        self.assertEqual(self.marrow("doctor", plugins=[self.scratch]).returncode, 0)
+
+    def test_the_build_writes_the_list(self):
+        self.write("CMakeLists.txt", PROJECT % SOURCE)
+        for left_out, nodes in (
+            ("mesh_voronoi;read_cad_file", {"mesh.voronoi": "MARROW_CAD", "read.cad_file": "MARROW_CAD"}),
+            ("", None),
+        ):
+            command = ["cmake", "-B", "build", "-DMARROW_CAD=OFF", "-DLEFT_OUT=" + left_out]
+            made = subprocess.run(command, cwd=self.scratch, capture_output=True, text=True)
+            self.assertEqual(made.returncode, 0, made.stderr)
+            file = self.scratch / "build" / "not_built.json"
+            self.assertEqual(json.loads(file.read_text()) if file.exists() else None, nodes)
+
+    def test_a_method_that_is_a_choice_of_another_node(self):
+        for method in ("sobel", "prewitt", "roberts"):
+            self.assertEqual(
+                self.fault("edges." + method),
+                ("unknown node 'edges.%s'" % method, "hint: use edges.gradient_mask with mask: " + method),
+            )
+        self.assertEqual(self.fault("edges.sobl")[1][:12], "hint: known:")
+        told = marrow("inspect", "edges.sobel").stderr
+        self.assertEqual(
+            told, "marrow: error: there is no node 'edges.sobel'; use edges.gradient_mask with mask: sobel\n"
+        )
+
+
+# The installed program works in any folder, and knows its plugins without describing them again.
+PAGES = {"marrow.1.gz", "marrow-run.1.gz", "marrow-cache-gc.1.gz", "marrow-open.1.gz", "marrow-workbench.1.gz"}
+
+
+class Install(SharedCase):
+    def make(self):
+        install = ["cmake", "--install", BUILD, "--prefix", self.scratch / "first"]
+        subprocess.run(install, check=True, stdout=subprocess.DEVNULL)
+        self.root = (self.scratch / "first").rename(self.scratch / "moved")
+
+    def installed(self, *arguments):
+        # With a separate cache, it uses nothing from earlier runs.
+        environment = {**os.environ, "XDG_CACHE_HOME": str(self.scratch / "cache")}
+        command = [self.root / "bin" / "marrow", *arguments]
+        result = subprocess.run(command, env=environment, cwd=self.scratch, capture_output=True, text=True)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        return result.stdout
+
+    def test_it_may_be_moved(self):
+        said = self.installed("doctor")
+        self.assertIn("moved/lib", said)
+        self.assertNotIn("note:", said, "no manifest is stale")
+        self.assertIn("edges.canny", self.installed("list", "edges"))
+        share = self.root / "share" / "marrow"
+        self.installed("check", share / "pipelines" / "femur" / "femur.yaml")
+        self.assertTrue((share / "schemas" / "pipeline.schema.json").is_file())
+
+    def test_manual_pages_and_completion(self):
+        share = self.root / "share"
+        self.assertLessEqual(PAGES, {path.name for path in (share / "man" / "man1").iterdir()})
+        page = gzip.decompress((share / "man" / "man1" / "marrow-plan.1.gz").read_bytes()).decode()
+        self.assertIn("marrow\\-plan \\- show what a run would compute", page)
+        for shell, file in (
+            ("bash", "bash-completion/completions/marrow"),
+            ("fish", "fish/vendor_completions.d/marrow.fish"),
+            ("zsh", "zsh/vendor-completions/_marrow"),
+        ):
+            self.assertEqual((share / file).read_text(), self.installed("completion", shell))
 
 
 if __name__ == "__main__":

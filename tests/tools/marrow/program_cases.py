@@ -11,9 +11,7 @@ COPY = "import shutil, sys\nfor to in sys.argv[2:]: shutil.copy(sys.argv[1], to)
 
 
 class Programs(Case):
-    def setUp(self):
-        super().setUp()
-        self.write("copied.py", COPY)
+    files = {"copied.py": COPY}
 
     def node(self, kind, command, inputs=None, **options):
         given = {"command": command, "version_command": VERSION, **options}

@@ -68,11 +68,7 @@ outputs: {s: s}
 
 class Repetition(Runs):
     has_own_store = True
-
-    def setUp(self):
-        super().setUp()
-        self.write("sum.yaml", BODY)
-        self.write("p.yaml", OVER)
+    files = {"sum.yaml": BODY, "p.yaml": OVER}
 
     def told(self, code, *arguments):
         result = self.expect(code, *arguments)

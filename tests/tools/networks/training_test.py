@@ -7,12 +7,16 @@ import tempfile
 import unittest
 import unittest.mock
 
-import network_cases
-import numpy as np
-import yaml
+import network_cases  # first: it looks for PyTorch
+
+import cv2
 import export
+import images
+import numpy as np
+import simulated
 import torch
 import training
+import yaml
 from model import Head, UNet
 
 
@@ -174,6 +178,139 @@ class Command(network_cases.InAFolder):
         done = network_cases.train("--help", PYTHONPATH="")
         self.assertEqual(done.returncode, 0)
         self.assertIn("networks: bones", done.stdout)
+
+
+# Images as a network sees them, against values computed by hand.
+
+
+class Images(unittest.TestCase):
+    def test_line_integrals(self):
+        grey = np.array([[1000, 500], [0, 1]], np.uint16)
+        darkest = -np.log(0.005)
+        np.testing.assert_allclose(images.line_integrals(grey), [[0, np.log(2)], [darkest, darkest]], rtol=1e-6)
+
+    def test_normalised(self):
+        values = np.arange(101, dtype=np.float32)
+        np.testing.assert_allclose(images.normalised(values, 10, 60), (values - 10) / 50, rtol=1e-6)
+        self.assertTrue((images.normalised(np.full(9, 3.0), 10, 60) == 0).all())
+
+    def test_resized_is_the_mean_of_pixels(self):
+        values = np.arange(16, dtype=np.float32).reshape(4, 4)
+        np.testing.assert_allclose(images.resized(values, 2), [[2.5, 4.5], [10.5, 12.5]])
+
+    def test_scaled(self):
+        np.testing.assert_allclose(images.scaled(np.array([0, 1, 5])), [0, 0.5, 2.5])
+
+    def test_a_random_motion_keeps_the_middle_and_the_zoom(self):
+        for seed in range(20):
+            matrix = images.random_motion(np.random.default_rng(seed), (64, 32), (10, 20), zoom=1.25)
+            np.testing.assert_allclose(matrix @ [10, 20, 1], [15.5, 31.5], atol=1e-9)
+            lengths = np.linalg.norm(matrix[:, :2], axis=0)
+            self.assertAlmostEqual(lengths[0], lengths[1])
+            self.assertTrue(0.79 < lengths[0] < 1.26)
+
+    def test_a_round_field_covers_what_is_outside_of_a_disc(self):
+        for seed in range(20):
+            random = np.random.default_rng(seed)
+            outside = images.outside_of_round_field(random, (120, 160))
+            values = random.uniform(0, 2, (120, 160)).astype(np.float32)
+            shown = images.covered(random, values, outside)
+            from_rim = cv2.distanceTransform((~outside).astype(np.uint8), cv2.DIST_L2, 5)
+            v, u = np.unravel_index(np.argmax(from_rim), from_rim.shape)
+            self.assertGreater(from_rim[v, u], 40)  # the disc's middle is deep inside
+            np.testing.assert_allclose(shown[from_rim > 12], values[from_rim > 12], atol=1e-4)
+            far = cv2.distanceTransform(outside.astype(np.uint8), cv2.DIST_L2, 5) > 12
+            if far.any():
+                self.assertLess(np.ptp(shown[far]), 1e-4)
+
+    def test_changes_depend_on_the_random_numbers_alone_and_stay_finite(self):
+        values = np.linspace(0, 3, 400, dtype=np.float32).reshape(20, 20)
+        likeness = []
+        for seed in range(30):
+            one, again = (images.changed(np.random.default_rng(seed), values) for _ in range(2))
+            self.assertTrue(np.isfinite(one).all())
+            self.assertTrue((one == again).all())
+            likeness.append(np.corrcoef(one.ravel(), values.ravel())[0, 1])
+        self.assertGreater(min(likeness), 0.5)
+        self.assertGreater(np.median(likeness), 0.9)
+
+
+# Simulated cases: what is drawn, and whether images, labels, borders, cameras and surfaces agree.
+
+
+class Drawing(unittest.TestCase):
+    def test_anatomies_of_the_parts_and_of_experiments_differ(self):
+        parts = [set(seeds) for seeds in simulated.SEEDS.values()] + [set(range(1, 51))]
+        self.assertEqual(len(set().union(*parts)), sum(map(len, parts)))
+
+    def test_depends_on_the_seed_alone(self):
+        one, again, other = (simulated.settings_of("femur", seed, 2, 64) for seed in (1000, 1000, 1001))
+        self.assertEqual(one, again)
+        self.assertNotEqual(one, other)
+
+    def test_half_of_the_metal_is_off(self):
+        drawn = [simulated.settings_of("femur", seed, 2, 64)[0] for seed in range(1000, 1400)]
+        for name in ("pin", "plate", "clamp", "cable", "table"):
+            off = np.mean([one["clutter." + name] == "off" for one in drawn])
+            self.assertTrue(0.45 < off < 0.65, (name, off))
+
+
+class Case(unittest.TestCase):
+    """One small case of each bone, made with marrow."""
+
+    def case(self, kind, seed=1003, size_px=128):
+        with tempfile.TemporaryDirectory() as data, contextlib.redirect_stderr(io.StringIO()):
+            simulated.make_cases(data, kind, [seed], views=2, size_px=size_px, surfaces=True)
+            case = simulated.read_case(data, kind, seed)
+            vertices = {fragment.name: fragment.vertices_mm() for fragment in case.fragments}
+        return case, vertices
+
+    def check(self, case, vertices):
+        self.assertEqual([view.name for view in case.views], ["v0", "v1"])
+        for view in case.views:
+            self.assertEqual(view.grey.shape, (128, 128))
+            self.assertEqual(view.classes.shape, (128, 128))
+            self.assertLess(view.classes.max(), len(simulated.CLASSES))
+            np.testing.assert_allclose(view.project([[0, 0, 0]]), [[63.5, 63.5]], atol=1e-6)
+            bone = (view.classes == 1) | (view.classes == 2)  # metal may hide it
+            shown = cv2.dilate((view.classes > 0).astype(np.uint8), np.ones((3, 3), np.uint8))
+            # The projected surface covers the bone of the fragments, and borders lie beside pixels that are not bone.
+            for fragment in case.fragments:
+                world = vertices[fragment.name] @ fragment.world_from_model[:3, :3].T + fragment.world_from_model[:3, 3]
+                at = np.rint(view.project(world)).astype(int)
+                at = at[((at >= 0) & (at < 128)).all(axis=1)]
+                if len(at) > 100:  # one of a broken bone may be out of view
+                    self.assertGreater(np.mean(shown[at[:, 1], at[:, 0]]), 0.99)
+            at = view.borders_px.astype(int)
+            self.assertTrue((view.classes[at[:, 1], at[:, 0]] < 2).all())
+            near = cv2.dilate(bone.astype(np.uint8), np.ones((3, 3), np.uint8))
+            self.assertTrue(near[at[:, 1], at[:, 0]].all())
+        self.assertGreater(sum(len(view.borders_px) for view in case.views), 50)
+
+    def test_broken_femur(self):
+        case, vertices = self.case("femur")
+        self.assertEqual([fragment.name for fragment in case.fragments], ["distal", "proximal"])
+        self.check(case, vertices)
+
+    def test_vertebra(self):
+        case, vertices = self.case("vertebra")
+        self.assertEqual([fragment.name for fragment in case.fragments], ["bone"])
+        self.check(case, vertices)
+
+
+class Messages(unittest.TestCase):
+    def test_a_build_is_needed(self):
+        with unittest.mock.patch.object(simulated, "ROOT", pathlib.Path("/nowhere")):
+            with self.assertRaisesRegex(SystemExit, "^train: build marrow first, with tools/setup$"):
+                simulated.make_case(pathlib.Path("/nowhere/1"), "femur", 1)
+
+    def test_a_simulation_that_fails_is_named(self):
+        drawn = ({"bone.uses": "simulate.femur", "bone.no_such_option": 1}, "off")
+        with tempfile.TemporaryDirectory() as data, unittest.mock.patch.object(
+            simulated, "settings_of", lambda *_: drawn
+        ):
+            with self.assertRaisesRegex(SystemExit, "simulation of femur, seed 7, failed:\n.*no_such_option"):
+                simulated.make_case(pathlib.Path(data) / "7", "femur", 7)
 
 
 if __name__ == "__main__":

@@ -184,10 +184,8 @@ class PageTest(BenchTest, BrowserTest):
 
     def says(self, selector, part):
         """Waits until one of the elements has this in its text."""
-        self.wait(
-            "[...document.querySelectorAll(%r)].some((one) => one.textContent.includes(%s))"
-            % (selector, json.dumps(part))
-        )
+        holds = "[...document.querySelectorAll(%r)].some((one) => one.textContent.includes(%s))"
+        self.wait(holds % (selector, json.dumps(part)))
 
     def do(self, name):
         """Presses a button that stands for what it does, in sight or not."""
@@ -236,3 +234,32 @@ class PageTest(BenchTest, BrowserTest):
             return condition(document) and document
 
         return self.until(holds, "the draft", 240)
+
+
+PIPELINE = """\
+marrow: 1
+name: small
+inputs:
+  level: {type: number, help: height of the fracture}
+nodes:
+  bone: {uses: simulate.femur}
+  fracture: {uses: simulate.fracture, in: {bone: bone}, with: {height_fraction: $level}}
+  cameras:   # two views
+    uses: camera.carm
+    with:
+      names: [frontal, lateral]   # as in the clinic
+      width_px: 96
+      height_px: 96
+      pixel_mm: 3
+  views: {uses: simulate.fluoroscopy, in: {phantom: fracture, cameras: cameras}}
+  edges: {uses: edges.canny, in: {view: views}, with: {noise_high: 5}}  # quick
+  truth: {uses: simulate.truth, in: {phantom: fracture}}
+outputs: {cameras: cameras, edges: edges, model: truth.models}
+"""
+
+
+class PipelineBench(BenchTest):
+    def setUp(self):
+        super().setUp()
+        self.file = self.folder / "small.yaml"
+        self.file.write_text(PIPELINE)

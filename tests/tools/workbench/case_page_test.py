@@ -2,7 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """A case made on the page "Case": CT, label map or surfaces, seeds, landmarks, segmentation and saving, by clicks and
 keys. Its X-ray views are in the draft from the beginning."""
-import json
 import math
 import re
 

@@ -21,10 +21,8 @@ from made_cases import LOWER, RADIUS, SIZE, UPPER, balls, point_of, two_balls, w
 
 LARGE = (120, 116, 124)  # it has more voxels than a coarse grid
 # Coarser than the CT, mirrored in x and z, and it does not cover the CT's first and last slices.
-LABELS = {
-    **formats.straight((20, 18, 20), (2.0, 2.0, 2.0), (38.5, 0.5, 40.5)),
-    "direction": [[-1, 0, 0], [0, 1, 0], [0, 0, -1]],
-}
+LABELS = formats.straight((20, 18, 20), (2.0, 2.0, 2.0), (38.5, 0.5, 40.5))
+LABELS["direction"] = [[-1, 0, 0], [0, 1, 0], [0, 0, -1]]
 
 
 class CtTest(BenchTest):

@@ -5,11 +5,10 @@ run, and its report."""
 import shutil
 import unittest
 
-from bench import BenchTest
+from bench import PIPELINE, BenchTest
 from harness import firefox, skip
 from harness.cases import SMALL, simulate
 from harness.page import BrowserTest
-from pipeline_bench import PIPELINE
 
 
 class FirefoxTest(BenchTest, BrowserTest):

@@ -1,15 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // The editor of pipeline files: it makes each wanted change, and all other text stays.
-#include "workbench/pipeline_edit.hpp"
+#include "workbench/pipeline.hpp"
 
-#include <gtest/gtest.h>
-#include <yaml-cpp/yaml.h>
-
-#include <set>
 #include <sstream>
 
-#include "marrow/base/diagnostics.hpp"
-#include "marrow/base/error.hpp"
 #include "marrow/base/yaml.hpp"
 #include "tests/framework/fixture.hpp"
 

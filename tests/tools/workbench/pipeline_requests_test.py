@@ -5,7 +5,7 @@ import json
 import unittest
 
 from harness.program import marrow
-from pipeline_bench import PIPELINE, PipelineBench
+from bench import PIPELINE, PipelineBench
 
 CAMERAS = {"what": "option", "node": "cameras", "uses": "camera.carm", "name": "width_px"}
 EDGES = {"what": "option", "node": "edges", "uses": "edges.canny", "name": "noise_high"}

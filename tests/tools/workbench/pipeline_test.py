@@ -5,10 +5,9 @@ zoomed, the text is completed and follows the chosen node, inputs are kept, and 
 import os
 import unittest.mock
 
-from bench import PageTest
+from bench import PIPELINE, PageTest, PipelineBench
 from harness import TEST_PLUGINS
 from harness.page import main
-from pipeline_bench import PIPELINE, PipelineBench
 
 EDITOR = "document.querySelector('.CodeMirror').CodeMirror"
 

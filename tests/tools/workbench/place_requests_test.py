@@ -4,7 +4,6 @@
 tracking as on the command line."""
 import concurrent.futures
 import copy
-import json
 import math
 import shlex
 import shutil
@@ -157,9 +156,7 @@ class PlaceTest(PlaceRequests):
     def test_a_registration_can_be_stopped(self):
         asked = {"case": "case", "pipeline": self.opened()["pipelines"][0]["file"]}
         for i in range(5):  # on a busy machine the stop may come too late
-            job = self.server.post("/api/place/register", **asked, poses={"distal": shifted(self.truth, 0.5 * i)})[
-                "job"
-            ]
+            job = self.server.post("/api/place/register", **asked, poses={"distal": shifted(self.truth, i / 2)})["job"]
             self.server.post("/api/job/stop", job=job)
             state = self.server.finish(job)["state"]
             if state == "stopped":

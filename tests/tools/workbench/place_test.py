@@ -188,7 +188,7 @@ class PlaceTest(PlacePage):
         costs = lambda value: {"bone": {"contour": cost(value), "grey_values": cost(value)}}
         self.driver.get("about:blank")
         shown = self.js(
-            modules(Costs="workbench/page/place_costs.js")
+            modules(Costs="workbench/page/place_steps.js")
             + """const table = document.createElement('table'), [before, now, views] = arguments;
             Costs.fill(table, now, 'bone', before.map((costs) => ({costs})), views);
             const fill = table.querySelector('[data-cost=contour] .cost-fill');

@@ -44,10 +44,8 @@ class PlacePage(PageTest):
         """Where a pixel of the X-ray is in the window."""
         left, top, width, height = self.browser.box('.place-canvas[data-view="%s"]' % view)
         camera = self.camera(view)
-        return (
-            left + (pixel[0] + 0.5) / camera["width_px"] * width,
-            top + (pixel[1] + 0.5) / camera["height_px"] * height,
-        )
+        u, v = (pixel[0] + 0.5) / camera["width_px"], (pixel[1] + 0.5) / camera["height_px"]
+        return left + u * width, top + v * height
 
     def drag(self, view, *pixels, button="left", modifiers=0):
         held = {"left": 1, "right": 2}[button]

@@ -8,10 +8,9 @@ import shutil
 import tempfile
 import urllib.parse
 
-from bench import BenchTest, PageTest
+from bench import PIPELINE, BenchTest, PageTest
 from harness.page import main
 from harness.program import marrow
-from pipeline_bench import PIPELINE
 
 
 class ResultsBench(BenchTest):
@@ -224,9 +223,8 @@ class ResultsPageTest(ResultsBench, PageTest):
         self.assertIn("The poses of distal are 2.00° and ", line)
         self.assertTrue(line.endswith("mm apart."), line)
         self.show_results("runs/straight&with=runs/hardly")
-        self.assertEqual(
-            self.text(".pose-difference"), "The poses of distal are the same, to less than 0.001° and 0.001 mm."
-        )
+        same = "The poses of distal are the same, to less than 0.001° and 0.001 mm."
+        self.assertEqual(self.text(".pose-difference"), same)
 
     def test_a_report_is_shown_in_the_page_and_its_script_runs(self):
         self.show_results()

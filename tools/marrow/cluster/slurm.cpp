@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "cluster/slurm.hpp"
-
 #include <algorithm>
 #include <atomic>
 #include <chrono>
@@ -8,17 +6,13 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 
-#include "cluster/chunk_rows.hpp"
-#include "cluster/scripts.hpp"
-#include "marrow/base/error.hpp"
+#include "cluster/cluster.hpp"
 #include "marrow/base/json_text.hpp"
 #include "marrow/base/number_text.hpp"
 #include "marrow/base/printable.hpp"
-#include "marrow/base/text_file.hpp"
 #include "marrow/runtime/pipeline/pipeline_names.hpp"
 #include "process.hpp"
 #include "report/report.hpp"
-#include "watch/child.hpp"
 
 namespace marrow::cli {
 namespace {

@@ -1,14 +1,95 @@
 // SPDX-License-Identifier: Apache-2.0
 // The answer of a comparison as tables for the terminal.
+//
+// All pairs, the rankings and the effects of factors for the terminal.
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
 #include "compare/comparison.hpp"
 #include "compare/text_table.hpp"
 #include "marrow/base/number_text.hpp"
 #include "marrow/base/printable.hpp"
+#include "marrow/runtime/pipeline/pipeline_names.hpp"
 
 namespace marrow::cli {
 namespace {
 
 using compare::Experiment;
+
+constexpr double kLargestFixed = 1e7, kSmallestFixed = 1e-5;
+
+int power_of_ten(double value) { return int(std::floor(std::log10(value))); }
+
+/// The number of characters: all bytes but those that continue one.
+std::size_t characters_in(const std::string& text) {
+  return std::size_t(std::count_if(text.begin(), text.end(), [](unsigned char byte) { return (byte & 0xC0) != 0x80; }));
+}
+
+constexpr std::size_t kMostPairs = 200;  // sentences of pairs; all are in comparison.json
+
+std::string names_text(const Experiment& experiment, const std::vector<std::size_t>& variants) {
+  std::vector<std::string> names;
+  for (const std::size_t variant : variants) names.push_back(experiment.variants[variant].name);
+  return joined(names, ", ");
+}
+
+std::string metric_title(const Experiment& experiment, const Answer& answer, std::size_t m) {
+  return experiment.metrics[m].label + (answer.units[m].empty() ? "" : " [" + answer.units[m] + "]");
+}
+
+/// The pairs without the baseline, whose sentences stand above. Those that differ come first.
+std::string sentences_of_pairs(const Experiment& experiment, const Answer& answer) {
+  std::vector<const Finding*> others;
+  for (const auto& [finding, reference] : answer.pairs)
+    if (reference != experiment.baseline) others.push_back(&finding);
+  if (others.empty()) return "";
+  std::stable_partition(others.begin(), others.end(),
+                        [](const Finding* one) { return compare::difference_shown(one->comparison, one->p_holm); });
+  std::string text = "\nThe other pairs, in the same correction; those that differ come first\n";
+  for (std::size_t i = 0; i < std::min(others.size(), kMostPairs); ++i)
+    text += "  " + printable(others[i]->sentence) + "\n";
+  if (others.size() > kMostPairs) text += formatted("  and {} more, in comparison.json\n", others.size() - kMostPairs);
+  return text;
+}
+
+std::string ranking_text(const Experiment& experiment, const Answer& answer, std::size_t m) {
+  const Ranking& ranking = answer.rankings[m];
+  std::vector<double> medians;
+  for (const Ranking::Place& place : ranking.places) medians.push_back(place.median);
+  const NumberScale scale(medians);
+  const bool has_groups = ranking.places.empty() || !ranking.places[0].group.empty();
+  using enum Side;
+  TextTable table({right, left, right, right, left});
+  table.add({"", "", "median", "lost", "groups"});
+  for (const Ranking::Place& place : ranking.places)
+    table.add({formatted("{}", place.rank), experiment.variants[place.variant].name,
+               std::isfinite(place.median) ? scale.text(place.median) : "a failure", formatted("{}", place.lost),
+               has_groups ? place.group : "-"});
+  return "\nRanking by " + printable(metric_title(experiment, answer, m)) +
+         "; a lost run counts as worse than any other; no test tells apart those that share a letter\n" + table.text() +
+         printable(ranking_sentence(experiment, answer, m)) + "\n";
+}
+
+/// The pairs, the rankings and the effects for the terminal; empty without any.
+std::string pairs_text(const Experiment& experiment, const Answer& answer) {
+  std::string text = sentences_of_pairs(experiment, answer);
+  for (std::size_t m = 0; m < answer.rankings.size(); ++m) text += ranking_text(experiment, answer, m);
+  return text;
+}
+
+std::string effects_text(const Experiment& experiment, const Answer& answer) {
+  std::string text;
+  const Effect* before = nullptr;
+  for (const Effect& effect : answer.effects) {
+    if (!before || before->metric != effect.metric)
+      text += "\nWhat each factor does to " + printable(metric_title(experiment, answer, effect.metric)) +
+              ", averaged over the others; each interval by itself\n";
+    text += "  " + printable(experiment.factors[effect.factor].name + ": " + effect.sentence) + "\n";
+    before = &effect;
+  }
+  return text;
+}
 
 constexpr const char* kNone = "-";
 
@@ -142,6 +223,104 @@ std::string capture_text(const Experiment& experiment, const Answer& answer) {
 }
 
 }  // namespace
+
+NumberScale::NumberScale(const std::vector<double>& values) {
+  double largest = 0, smallest = std::numeric_limits<double>::infinity();
+  for (const double value : values) {
+    const double size = std::abs(value);
+    if (!std::isfinite(size) || size == 0) continue;
+    largest = std::max(largest, size);
+    smallest = std::min(smallest, size);
+  }
+  if (largest == 0) return;
+  has_exponents_ = largest >= kLargestFixed || largest < kSmallestFixed;
+  if (has_exponents_) return;
+  const int of_largest = power_of_ten(largest), of_smallest = power_of_ten(smallest);
+  const int wanted = of_largest < 0 ? 3 - of_largest : of_largest < 2 ? 4 : std::max(0, 5 - of_largest);
+  decimals_ = std::clamp(2 - of_smallest, wanted, wanted + 3);  // three digits of the smallest, if that is not too many
+}
+
+std::string NumberScale::text(double value) const {
+  if (value == 0) return fixed_number(0, has_exponents_ ? 0 : decimals_);
+  const bool is_too_small = std::abs(value) < 10 * std::pow(10.0, -decimals_);
+  return has_exponents_ || is_too_small ? formatted("{:.3e}", value) : formatted("{:.{}f}", value, decimals_);
+}
+
+std::string rate_text(std::size_t count, std::size_t of, const compare::Interval& interval, int decimals) {
+  if (!of) return "-";
+  return formatted("{}/{} ({} to {} %)", count, of, percent_text(interval.lower, decimals),
+                   percent_text(interval.upper, decimals));
+}
+
+void TextTable::add(const std::vector<std::string>& row) {
+  rows_.emplace_back();
+  for (const std::string& text : row) rows_.back().push_back(printable(text));
+}
+
+std::string TextTable::text() const {
+  std::vector<std::size_t> widths(columns_.size());
+  for (const auto& row : rows_)
+    for (std::size_t c = 0; c < row.size(); ++c) widths[c] = std::max(widths[c], characters_in(row[c]));
+  std::string text;
+  for (const auto& row : rows_) {
+    std::string line;
+    for (std::size_t c = 0; c < row.size(); ++c) {
+      const std::string blanks(widths[c] - characters_in(row[c]), ' ');
+      line += (c ? "  " : "") + (columns_[c] == Side::right ? blanks + row[c] : row[c] + blanks);
+    }
+    line.erase(line.find_last_not_of(' ') + 1);
+    text += line + "\n";
+  }
+  return text;
+}
+
+std::string csv_field(const std::string& raw) {
+  std::string text;
+  for (std::size_t begin = 0, end = 0; begin <= raw.size(); begin = end + 1) {
+    end = std::min(raw.find('\n', begin), raw.size());
+    text += (begin ? "\n" : "") + printable(raw.substr(begin, end - begin));
+  }
+  if (!text.empty() && std::string("=+-@\t\r\n").find(text[0]) != std::string::npos && !parsed_number(text))
+    text = "'" + text;
+  if (text.find_first_of(",\"\n\r") == std::string::npos) return text;
+  std::string quoted = "\"";
+  for (char c : text) quoted += c == '"' ? "\"\"" : std::string(1, c);
+  return quoted + "\"";
+}
+
+std::string csv_number(const std::optional<double>& value) {
+  if (!value) return "";
+  return formatted("{:.9g}", *value);
+}
+
+std::vector<std::string> csv_cells(const std::string& line) {
+  std::vector<std::string> cells(1);
+  bool quoted = false;
+  for (std::size_t i = 0; i < line.size(); ++i) {
+    const char c = line[i];
+    if (c == '"' && quoted && i + 1 < line.size() && line[i + 1] == '"')
+      cells.back() += line[i++];
+    else if (c == '"')
+      quoted = !quoted;
+    else if (c == ',' && !quoted)
+      cells.emplace_back();
+    else if (c != '\r')
+      cells.back() += c;
+  }
+  return cells;
+}
+
+std::string ranking_sentence(const Experiment& experiment, const Answer& answer, std::size_t m) {
+  const Ranking& ranking = answer.rankings[m];
+  std::string text =
+      "best in " + experiment.metrics[m].label + ": " + experiment.variants[ranking.places.front().variant].name;
+  text += formatted("; {} of {} pairs differ", ranking.different, ranking.pairs);
+  if (!ranking.better_than_best.empty())
+    text += "; shown to be better than it, compared case by case: " + names_text(experiment, ranking.better_than_best);
+  text += "; not told apart from it: " +
+          (ranking.like_best.empty() ? std::string("none") : names_text(experiment, ranking.like_best));
+  return text;
+}
 
 std::string table_text(const Experiment& experiment, const Answer& answer) {
   std::string text = overview(experiment, answer);

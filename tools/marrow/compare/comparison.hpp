@@ -5,22 +5,58 @@
 #include <map>
 #include <nlohmann/json_fwd.hpp>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
-#include "compare/tuning.hpp"
 #include "marrow/compare/bootstrap.hpp"
 #include "marrow/compare/case_rate.hpp"
 #include "marrow/compare/cell.hpp"
-#include "marrow/compare/experiment.hpp"
-#include "marrow/compare/paired.hpp"
-#include "marrow/compare/statistics.hpp"
 
 namespace CLI {
 class App;
 }
 
 namespace marrow::cli {
+
+/// The training cases and starts at one point.
+struct TuningPoint {
+  std::vector<double> values;  ///< of the options; empty for the variant of the file
+  /// What the optimizer improves: the mean over all runs, where each failed or worse run counts as TuneRule::failed_as.
+  /// So it is not the mean of the figure.
+  double score = 0;
+  std::optional<double> mean;  ///< of the unchanged figure, over the runs that have it; nothing if none has it
+  std::size_t runs = 0;
+  std::size_t failed = 0;    ///< runs without the figure: the cell failed, or a node in it that may fail
+  std::size_t capped = 0;    ///< runs whose figure is worse than TuneRule::failed_as
+  std::string refused = {};  ///< why the pipeline does not take these values together; then it was not run
+};
+
+/// The score of rows that one variant made.
+TuningPoint point_of(const compare::Experiment& experiment, const std::vector<double>& values,
+                     const std::vector<compare::CellRow>& rows);
+
+struct Tuning {
+  compare::TuneRule rule;
+  TuningPoint untuned;                ///< the variant of the file
+  std::vector<TuningPoint> points;    ///< in the order in which they were tried; equal ones once
+  std::optional<std::size_t> best;    ///< nothing if no point is better than failed runs only
+  std::string figure, unit, variant;  ///< names of the metric and of the variant that was tuned
+  bool higher_is_better = false;
+  std::string curves;           ///< JSON of the response curves over all points, as curves_json() makes it
+  std::string stopped_because;  ///< the optimizer's own words
+
+  void add(TuningPoint point);
+  bool is_better() const;  ///< whether the best point is better than the untuned variant, on the training cases
+
+ private:
+  bool is_better_score(double one, double other) const { return higher_is_better ? one > other : one < other; }
+};
+
+/// "tuned on 20 cases by NODE, 31 points; score: SCORE_RULE; canny: 0.41 mm (mean 0.41 mm of 20 runs); edges.high 72.3:
+/// 0.23 mm (mean 0.23 mm of 20 runs)".
+std::string sentence(const Tuning& tuning);
+nlohmann::json tuning_json(const Tuning& tuning);
 
 /// Calls of nodes in the cells that a command ran, without cells that were done before.
 struct CallCounts {
@@ -57,9 +93,6 @@ struct CompareRequest {
   FileLimits file_limits;
 };
 
-/// The experiment file of the request; with inputs a new one, runs/compare/NAME.yaml, which extends it. Throws Error if
-/// there is no such experiment, or if another file has this name.
-std::filesystem::path experiment_with_inputs(const CompareRequest& request);
 /// Adds the arguments that all commands with an experiment share.
 void add_experiment_arguments(CLI::App* command, CompareRequest& request);
 /// Runs all cells that are not done yet, here or by tasks of a cluster. Then writes times, tables, pictures and the
@@ -257,26 +290,62 @@ void add_findings(const compare::Experiment& experiment, const std::vector<RowsO
 void add_effects(const compare::Experiment& experiment, const std::vector<RowsOfVariant>& rows, Answer& answer);
 /// "best in mTRE: a; 7 of 15 pairs differ; not told apart from it: b, c"
 std::string ranking_sentence(const compare::Experiment& experiment, const Answer& answer, std::size_t metric);
-/// The pairs, the rankings and the effects for the terminal; empty without any.
-std::string pairs_text(const compare::Experiment& experiment, const Answer& answer);
-std::string effects_text(const compare::Experiment& experiment, const Answer& answer);
 /// The response curves of all swept options: on a grid a point for each value, else in eight bins of the range.
 std::vector<Curve> curves_of(const compare::Experiment& experiment, const std::vector<RowsOfVariant>& rows);
 nlohmann::json curves_json(const compare::Experiment& experiment, const std::vector<Curve>& curves);
 
 /// The answer as a table for the terminal.
 std::string table_text(const compare::Experiment& experiment, const Answer& answer);
-/// Null for a bound that is not finite.
-nlohmann::json bound_json(double value);
-/// The keys "comparisons", and where there are any "all_pairs", "rankings" and "effects".
-nlohmann::json findings_json(const compare::Experiment& experiment, const Answer& answer);
 /// The complete answer; docs/comparing.md lists the keys.
 nlohmann::json answer_json(const compare::Experiment& experiment, const Answer& answer);
-/// A line for each pose that a cell found: whose it is, its matrix, its verdict and its predicted deviations.
-std::string poses_csv(const compare::Experiment& experiment, const std::vector<compare::CellRow>& rows);
-std::string poses_jsonl(const compare::Experiment& experiment, const std::vector<compare::CellRow>& rows);
 /// Writes cells.csv, cells.jsonl, poses.csv, poses.jsonl and comparison.json.
 void write_tables(const compare::Experiment& experiment, const std::vector<compare::CellRow>& rows,
                   const Answer& answer, const std::filesystem::path& folder);
+
+/// The unit of each figure of an experiment. Numbers in metres and in millimetres are never put together.
+class FigureUnits {
+ public:
+  explicit FigureUnits(const compare::Experiment& experiment);
+
+  /// Takes the units of rows of this experiment, or of one with the same figures. Throws Error if a figure has another
+  /// unit in one cell than in another, also if it has none in one of them. Cells without the figure do not count.
+  void add(const std::vector<compare::CellRow>& rows);
+
+  /// Of the experiment's metrics, in their order; empty for a number without a unit, and if no row has the figure.
+  std::vector<std::string> of_metrics() const;
+  /// Of the figure under 'initial_error'.
+  const std::string& of_initial_error() const { return figures_.back().unit; }
+
+ private:
+  struct Figure {
+    std::string path, unit;
+    std::string cell;  ///< the first one that has it; empty if there is none yet
+  };
+  static void add(Figure& figure, const std::string& unit, const std::string& cell);
+
+  std::vector<Figure> figures_;  ///< the metrics, and the initial error
+};
+
+/// The cells that are timed: of each variant those of the same cases and starts.
+class TimedCells {
+ public:
+  /// `rows` are those of all cells, in the order of cells_of().
+  TimedCells(const compare::Experiment& experiment, const std::vector<compare::CellRow>& rows);
+
+  /// Numbers of the cells, in the order in which they are timed. The variants take turns, and their order is reversed
+  /// from one case and start to the next, so that none always comes first.
+  const std::vector<std::size_t>& numbers() const { return numbers_; }
+  /// Removes the times of cases and starts in which not every variant has one, and times that were not measured now.
+  void keep_complete(std::vector<compare::CellRow>& rows);
+  /// What was measured, for people.
+  std::string sentence(bool has_store) const;
+
+ private:
+  std::size_t asked_, variants_;
+  std::size_t places_ = 0, lost_ = 0;
+  bool has_fewer_ = false;   ///< fewer than requested, because some failed
+  std::string without_any_;  ///< names of variants that were done nowhere
+  std::vector<std::size_t> numbers_;
+};
 
 }  // namespace marrow::cli

@@ -7,12 +7,7 @@
 
 #include <cerrno>
 #include <cstdio>
-#include <cstring>
-#include <optional>
 
-#include "marrow/base/atomic_file.hpp"
-#include "marrow/base/error.hpp"
-#include "marrow/base/hash.hpp"
 #include "marrow/base/printable.hpp"
 #include "marrow/base/text_file.hpp"
 

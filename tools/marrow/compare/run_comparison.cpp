@@ -8,17 +8,11 @@
 #include <set>
 #include <thread>
 
-#include "cluster/plan.hpp"
 #include "commands.hpp"
 #include "compare/cell_jobs.hpp"
-#include "compare/known_rows.hpp"
-#include "compare/progress.hpp"
-#include "compare/times.hpp"
-#include "compare/unchanged.hpp"
-#include "marrow/base/error.hpp"
 #include "marrow/base/number_text.hpp"
 #include "marrow/base/printable.hpp"
-#include "marrow/base/remove_tree.hpp"
+#include "marrow/base/temporary_folder.hpp"
 #include "process.hpp"
 #include "report/report.hpp"
 

@@ -1,12 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 // Writes cells.csv and cells.jsonl (one row per cell), poses.csv and poses.jsonl (one per pose), and comparison.json
 // (the complete answer).
+//
+// Which variants differ, how they rank, and what factors do, for comparison.json.
+#include <array>
 #include <cmath>
 #include <nlohmann/json.hpp>
 #include <set>
 
 #include "compare/comparison.hpp"
-#include "compare/csv.hpp"
+#include "compare/text_table.hpp"
 #include "marrow/base/json_text.hpp"
 #include "marrow/base/number_text.hpp"
 #include "marrow/base/text_file.hpp"
@@ -14,9 +17,192 @@
 namespace marrow::cli {
 namespace {
 
+using compare::CellPose;
 using compare::CellRow;
 using compare::Experiment;
 using nlohmann::json;
+
+/// Null for a bound that is not finite.
+json bound_json(double value) { return std::isfinite(value) ? json(value) : json(); }
+
+/// Who lost more runs, "variant" or the word for the other one; null if the median is a number.
+json who_fails_more(const compare::Comparison& comparison, bool higher_is_better, const std::string& other) {
+  if (!comparison.compared() || std::isfinite(comparison.median_difference)) return {};
+  return (comparison.median_difference > 0) != higher_is_better ? "variant" : other;
+}
+
+/// Whether a sentence about the comparison gives its interval: not with too few cases, nor between two failures.
+bool has_interval(const compare::Comparison& comparison) {
+  const compare::Interval& interval = comparison.interval;
+  return comparison.compared() >= compare::fewest_cases(1 - interval.confidence) &&
+         (std::isfinite(interval.lower) || std::isfinite(interval.upper) || interval.lower < interval.upper);
+}
+
+/// The numbers of a comparison, without p. `other` is the word for the one that the variant is compared with.
+json numbers_of(const compare::Comparison& comparison, bool higher_is_better, const std::string& other) {
+  const bool is_baseline = other == "baseline";
+  return {{"cases", comparison.compared()},
+          {"of_cases", comparison.cases.all()},
+          {"cases_variant_lost", comparison.cases.variant_lost},
+          {is_baseline ? "cases_baseline_lost" : "cases_reference_lost", comparison.cases.reference_lost},
+          {"runs", comparison.runs.all()},
+          {"pairs", comparison.runs.both},
+          {"runs_variant_lost", comparison.runs.variant_lost},
+          {is_baseline ? "runs_baseline_lost" : "runs_reference_lost", comparison.runs.reference_lost},
+          {"runs_both_lost", comparison.runs.neither},
+          {"difference", comparison.compared() ? bound_json(comparison.median_difference) : json()},
+          {"fails_more", who_fails_more(comparison, higher_is_better, other)},
+          {"difference_of_pairs", comparison.median_of_both ? json(*comparison.median_of_both) : json()},
+          {"has_interval", has_interval(comparison)},
+          {"low", bound_json(comparison.interval.lower)},
+          {"high", bound_json(comparison.interval.upper)}};
+}
+
+json of(const Finding& finding, const Experiment& experiment, const Answer& answer, const std::string& other) {
+  const compare::MetricChoice& metric = experiment.metrics[finding.metric];
+  json result = numbers_of(finding.comparison, metric.higher_is_better(), other);
+  result.update({{"variant", experiment.variants[finding.variant].name},
+                 {"metric", metric.path},
+                 {"unit", answer.units[finding.metric]},
+                 {"p", finding.comparison.test.p},
+                 {"p_holm", finding.p_holm},
+                 {"is_shown", compare::difference_shown(finding.comparison, finding.p_holm)},
+                 {"sentence", finding.sentence}});
+  return result;
+}
+
+json names_of(const Experiment& experiment, const std::vector<std::size_t>& variants) {
+  json names = json::array();
+  for (const std::size_t variant : variants) names.push_back(experiment.variants[variant].name);
+  return names;
+}
+
+json ranking_json(const Experiment& experiment, const Answer& answer, std::size_t m) {
+  const Ranking& ranking = answer.rankings[m];
+  json places = json::array();
+  for (const Ranking::Place& place : ranking.places)
+    places.push_back({{"variant", experiment.variants[place.variant].name},
+                      {"rank", place.rank},
+                      {"median", bound_json(place.median)},
+                      {"lost", place.lost},
+                      {"group", place.group.empty() ? json() : json(place.group)}});
+  return {{"metric", experiment.metrics[m].path},
+          {"unit", answer.units[m]},
+          {"places", places},
+          {"pairs", ranking.pairs},
+          {"different", ranking.different},
+          {"like_best", names_of(experiment, ranking.like_best)},
+          {"better_than_best", names_of(experiment, ranking.better_than_best)},
+          {"sentence", ranking_sentence(experiment, answer, m)}};
+}
+
+json of(const Effect& effect, const Experiment& experiment, const Answer& answer) {
+  const compare::MetricChoice& metric = experiment.metrics[effect.metric];
+  const compare::Factor& factor = experiment.factors[effect.factor];
+  json result = numbers_of(effect.comparison, metric.higher_is_better(), "reference");
+  result.update({{"factor", factor.name},
+                 {"variant", factor.levels[effect.level]},
+                 {"reference", factor.levels.front()},
+                 {"metric", metric.path},
+                 {"unit", answer.units[effect.metric]},
+                 {"sentence", effect.sentence}});
+  return result;
+}
+
+/// The keys "comparisons", and where there are any "all_pairs", "rankings" and "effects".
+json findings_json(const Experiment& experiment, const Answer& answer) {
+  json result = {{"comparisons", json::array()}};
+  for (const Finding& finding : answer.findings)
+    result["comparisons"].push_back(of(finding, experiment, answer, "baseline"));
+  for (const PairFinding& pair : answer.pairs) {
+    json one = of(pair.finding, experiment, answer, "reference");
+    one["reference"] = experiment.variants[pair.reference].name;
+    result["all_pairs"].push_back(std::move(one));
+  }
+  for (std::size_t m = 0; m < answer.rankings.size(); ++m)
+    result["rankings"].push_back(ranking_json(experiment, answer, m));
+  for (const Effect& effect : answer.effects) result["effects"].push_back(of(effect, experiment, answer));
+  return result;
+}
+
+constexpr std::array kRotations{"frontal", "lateral", "axial"};
+
+constexpr std::array kTranslations{"along_frontal", "along_lateral", "along"};
+
+/// Seeds of the cases that have one, by the case's name.
+std::map<std::string, std::uint64_t> seeds_of(const Experiment& experiment) {
+  std::map<std::string, std::uint64_t> seeds;
+  for (const compare::ExperimentCase& one : experiment.cases)
+    if (one.is_simulated || one.folder.empty()) seeds[one.name] = one.seed;
+  return seeds;
+}
+
+std::string head() {
+  std::string text = "cell,case,variant,start,seed,output,item,target,source";
+  for (const char row : {'1', '2', '3'})
+    for (const char* end : {"1", "2", "3", "4_mm"}) text += std::string(",m") + row + end;
+  text += ",verdict,failure_probability,axes";
+  for (const char* axis : kRotations) text += std::string(",predicted_") + axis + "_deg";
+  for (const char* axis : kTranslations) text += std::string(",predicted_") + axis + "_mm";
+  return text + "\n";
+}
+
+const char* axes_of(const CellPose& pose) {
+  return pose.deviations.empty() ? "" : pose.has_bone_axes ? "bone" : "model";
+}
+
+/// A line for each pose that a cell found: whose it is, its matrix, its verdict and its predicted deviations.
+std::string poses_csv(const Experiment& experiment, const std::vector<CellRow>& rows) {
+  const auto seeds = seeds_of(experiment);
+  std::string text = head();
+  for (const CellRow& row : rows)
+    for (const CellPose& pose : row.poses) {
+      const auto seed = seeds.find(row.case_name);
+      text += csv_field(row.id) + "," + csv_field(row.case_name) + "," + csv_field(row.variant) + "," +
+              csv_field(row.start) + "," + (seed == seeds.end() ? "" : formatted("{}", seed->second));
+      for (const std::string& name : {pose.output, pose.item, pose.target, pose.source}) text += "," + csv_field(name);
+      for (const double number : pose.matrix) text += "," + exact_number(number);
+      text += formatted(",{},{},{}", pose.verdict ? name_of(*pose.verdict) : "", csv_number(pose.failure_probability),
+                        axes_of(pose));
+      for (std::size_t i = 0; i < 6; ++i)
+        text += "," + (i < pose.deviations.size() ? csv_number(pose.deviations[i]) : std::string());
+      text += "\n";
+    }
+  return text;
+}
+
+std::string poses_jsonl(const Experiment& experiment, const std::vector<CellRow>& rows) {
+  const auto seeds = seeds_of(experiment);
+  const auto of = [](const std::optional<double>& value) { return value ? json(*value) : json(); };
+  std::string text;
+  for (const CellRow& row : rows)
+    for (const CellPose& pose : row.poses) {
+      const auto seed = seeds.find(row.case_name);
+      json matrix = json::array(), predicted;
+      for (std::size_t r = 0; r < 3; ++r)
+        matrix.push_back(std::vector<double>(pose.matrix.begin() + std::ptrdiff_t(4 * r),
+                                             pose.matrix.begin() + std::ptrdiff_t(4 * r + 4)));
+      matrix.push_back({0, 0, 0, 1});
+      for (std::size_t i = 0; i < pose.deviations.size(); ++i)
+        predicted[i < 3 ? "rotation_deg" : "translation_mm"].push_back(of(pose.deviations[i]));
+      if (!predicted.is_null()) predicted["axes"] = axes_of(pose);
+      text += json_text({{"cell", row.id},
+                         {"case", row.case_name},
+                         {"variant", row.variant},
+                         {"start", row.start},
+                         {"seed", seed == seeds.end() ? json() : json(seed->second)},
+                         {"output", pose.output},
+                         {"item", pose.item},
+                         {"target", pose.target},
+                         {"source", pose.source},
+                         {"matrix", matrix},
+                         {"verdict", pose.verdict ? json(name_of(*pose.verdict)) : json()},
+                         {"failure_probability", of(pose.failure_probability)},
+                         {"predicted_deviation", predicted}}) +
+              "\n";
+    }
+  return text;
+}
 
 /// The options that any variant changes.
 std::vector<std::string> changed_options(const Experiment& experiment) {
@@ -207,5 +393,7 @@ void write_tables(const Experiment& experiment, const std::vector<CellRow>& rows
   write_text_file(folder / "poses.jsonl", poses_jsonl(experiment, rows));
   write_text_file(folder / "comparison.json", json_text(answer_json(experiment, answer), 1) + "\n");
 }
+
+// The poses of all cells: poses.csv and poses.jsonl.
 
 }  // namespace marrow::cli

@@ -8,16 +8,16 @@
 #include <cstdlib>
 #include <cstring>
 #include <filesystem>
+#include <map>
 #include <memory>
+#include <nlohmann/json.hpp>
+#include <string>
 
 #include "command_options.hpp"
-#include "commands.hpp"
-#include "conformance/given_options.hpp"
-#include "marrow/base/number_text.hpp"
 #include "marrow/base/printable.hpp"
-#include "marrow/base/reason_of_exception.hpp"
 #include "marrow/base/temporary_folder.hpp"
 #include "marrow/plugin.hpp"
+#include "marrow/runtime/node/option_yaml.hpp"
 #include "marrow/runtime/pipeline/pipeline_names.hpp"
 #include "marrow/runtime/process/worker.hpp"
 #include "process.hpp"
@@ -28,6 +28,27 @@ namespace {
 using conformance::Check;
 using nlohmann::json;
 using OptionValues = std::map<std::string, OptionValue>;
+
+/// Values for the node's options, from the texts that --set gives by the options' names. Other names are left out.
+/// Throws Error for a value that does not fit.
+std::map<std::string, OptionValue> given_options(const NodeInfo& node, const nlohmann::json& texts) {
+  std::map<std::string, OptionValue> values;
+  for (const OptionInfo& option : node.options) {
+    if (!texts.contains(option.name)) continue;
+    const Place place{"--set " + option.name};
+    Diagnostics faults;
+    StrictYaml yaml(place, faults);
+    const YAML::Node parsed = yaml.parse(texts.at(option.name).get<std::string>());
+    std::optional<OptionValue> value;
+    if (faults.empty())
+      value = read_option(yaml, parsed, place, option, "option '" + option.name + "'",
+                          [](const std::string& text, const Place&) { return std::optional(text); });
+    if (!value) throw Error(faults.text());
+    if (option.type == OptionType::path) *value = std::filesystem::absolute(std::get<std::string>(*value)).string();
+    values[option.name] = std::move(*value);
+  }
+  return values;
+}
 
 constexpr double kMemory_mb = 8192;
 
@@ -56,8 +77,7 @@ conformance::Inputs further_inputs(const Catalogue& catalogue, const NodeDefinit
     if (port == ports.end()) throw Error("it has no input '" + name + "'");
     if (!made_by) throw Error("there is no node '" + maker.get<std::string>() + "'");
     const KindInfo* kind = catalogue.find_kind(made_by->kind());
-    kept.push_back(kind && !kind->checks.empty() ? catalogue.load_kind(kind->name).suite.sample()
-                                                 : conformance::Inputs{});
+    kept.push_back(kind && !kind->checks.empty() ? catalogue.load_suite(kind->name).sample() : conformance::Inputs{});
     const auto output = std::find_if(made_by->outputs.begin(), made_by->outputs.end(),
                                      [&](const PortInfo& p) { return p.type == port->type; });
     if (output == made_by->outputs.end())
@@ -154,7 +174,7 @@ int check_worker(const std::filesystem::path& files_folder) {
   return serve_worker({{"check", [&](const json& request, WorkerReports&) {
                           const std::string name = request.at("node");
                           const NodeDefinition& node = catalogue.load(name);
-                          const conformance::Suite& suite = catalogue.load_kind(node.info.kind()).suite;
+                          const conformance::Suite& suite = catalogue.load_suite(node.info.kind());
                           OptionValues options = given_options(node.info, request.at("set"));
                           if (suite.options) options.merge(suite.options());
                           return json(measured(catalogue, node, request.at("in"), options,

@@ -4,10 +4,8 @@
 #include <set>
 
 #include "command_options.hpp"
-#include "commands.hpp"
 #include "compare/comparison_folder.hpp"
-#include "curves/curve_files.hpp"
-#include "marrow/base/error.hpp"
+#include "curves/curves.hpp"
 #include "marrow/base/number_text.hpp"
 #include "marrow/base/printable.hpp"
 

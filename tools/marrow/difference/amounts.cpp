@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "difference/amounts.hpp"
+#include "difference/difference.hpp"
 
 #include <algorithm>
 #include <cstdint>

@@ -1,10 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "difference/changes.hpp"
+#include "difference/difference.hpp"
 
 #include <algorithm>
 #include <set>
 
-#include "marrow/base/error.hpp"
 #include "marrow/base/number_text.hpp"
 #include "marrow/runtime/run/keys.hpp"
 

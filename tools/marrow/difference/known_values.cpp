@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "difference/known_values.hpp"
+#include "difference/difference.hpp"
 
 #include <nlohmann/json.hpp>
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "difference/run_record.hpp"
+#include "difference/difference.hpp"
 
 #include <yaml-cpp/yaml.h>
 
@@ -7,11 +7,9 @@
 #include <set>
 
 #include "command_options.hpp"
-#include "marrow/base/error.hpp"
 #include "marrow/base/json_text.hpp"
 #include "marrow/base/printable.hpp"
-#include "marrow/base/strict_yaml.hpp"
-#include "marrow/runtime/pipeline/written_content.hpp"
+#include "marrow/runtime/pipeline/named_files.hpp"
 #include "run_files.hpp"
 
 namespace marrow::cli {

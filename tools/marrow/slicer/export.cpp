@@ -10,10 +10,8 @@
 #include "../command_options.hpp"
 #include "../new/templates.hpp"
 #include "../process.hpp"
-#include "marrow/base/error.hpp"
 #include "marrow/base/printable.hpp"
 #include "marrow/base/text_file.hpp"
-#include "marrow/runtime/pipeline/judged_poses.hpp"
 #include "parameters.hpp"
 
 namespace marrow::cli {

@@ -4,10 +4,7 @@
 // are recognised in the options.
 #include "parameters.hpp"
 
-#include <algorithm>
-#include <map>
 #include <set>
-#include <variant>
 
 #include "marrow/base/number_text.hpp"
 

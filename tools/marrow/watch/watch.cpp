@@ -4,25 +4,197 @@
 #include <chrono>
 #include <cstdio>
 #include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <string>
 #include <thread>
+#include <vector>
 
 #include "command_options.hpp"
-#include "commands.hpp"
-#include "marrow/base/error.hpp"
 #include "marrow/base/number_text.hpp"
 #include "marrow/base/printable.hpp"
+#include "marrow/base/text_file.hpp"
+#include "marrow/runtime/pipeline/named_files.hpp"
 #include "process.hpp"
-#include "watch/child.hpp"
-#include "watch/files.hpp"
-#include "watch/page.hpp"
 
 namespace fs = std::filesystem;
 
 namespace marrow::cli {
 namespace {
 
+/// When each file was written last, and its size. Two states differ if anything was changed, added or removed.
+using FileStates = std::map<std::filesystem::path, std::pair<std::filesystem::file_time_type, std::uintmax_t>>;
+
+/// The files that a pipeline depends on. If it has a fault: those that could still be found.
+struct WatchedFiles {
+  std::vector<std::filesystem::path> paths;           ///< its file, those of its bodies, and what its options name
+  std::vector<std::filesystem::path> plugin_folders;  ///< whose libraries are used
+};
+
+/// A CMake build folder and the sources from which it is built.
+struct WatchedBuild {
+  std::filesystem::path folder, sources;
+};
+
+void add(const fs::path& file, FileStates& states) {
+  std::error_code gone;
+  const fs::file_time_type written = fs::last_write_time(file, gone);
+  if (gone) return;
+  const std::uintmax_t size = fs::file_size(file, gone);
+  if (!gone) states[file] = {written, size};
+}
+
+void add_below(const fs::path& folder, FileStates& states) {
+  std::error_code gone;
+  for (fs::recursive_directory_iterator entry(folder, fs::directory_options::skip_permission_denied, gone), end;
+       !gone && entry != end; entry.increment(gone))
+    if (entry->is_regular_file(gone)) add(entry->path(), states);
+}
+
+void add_files(const Pipeline& pipeline, std::vector<fs::path>& files) {
+  files.insert(files.end(), pipeline.files.begin(), pipeline.files.end());
+  for (const PipelineNode& node : pipeline.nodes) {
+    for (const std::string& path : paths_of(node)) files.push_back(path);
+    if (node.repetition) add_files(node.repetition->alone, files);
+  }
+}
+
+bool holds_sources(const fs::path& folder) {
+  const std::string name = folder.filename().string();
+  return !name.starts_with(".") && name != "runs" && name != "__pycache__" && !fs::exists(folder / "CMakeCache.txt");
+}
+
+WatchedFiles files_of(const PipelineRequest& request) {
+  const Catalogue catalogue;
+  WatchedFiles files{{request.file}, catalogue.folders()};
+  files.paths.insert(files.paths.end(), request.settings.begin(), request.settings.end());
+  Diagnostics diagnostics;
+  add_files(read_pipeline(request.file, arguments_of(request), catalogue, diagnostics, false), files.paths);
+  return files;
+}
+
+/// The states of the files, of all files below the folders, and of the libraries of plugins. Leaves out what does not
+/// exist or cannot be read.
+FileStates states_of(const WatchedFiles& files) {
+  FileStates states;
+  std::error_code gone;
+  for (const fs::path& path : files.paths)
+    if (fs::is_directory(path, gone))
+      add_below(path, states);
+    else
+      add(path, states);
+  for (const fs::path& folder : files.plugin_folders)
+    for (fs::directory_iterator entry(folder, gone), end; !gone && entry != end; entry.increment(gone))
+      if (entry->path().extension() == ".so" || entry->path().extension() == ".py") add(entry->path(), states);
+  return states;
+}
+
+/// Throws Error if the folder is no build folder of CMake.
+WatchedBuild watched_build(const fs::path& folder) {
+  std::ifstream cache(folder / "CMakeCache.txt");
+  const std::string key = "CMAKE_HOME_DIRECTORY:INTERNAL=";
+  for (std::string line; std::getline(cache, line);)
+    if (line.starts_with(key)) return {fs::absolute(folder), line.substr(key.size())};
+  throw Error("--build " + printable(folder.string()) +
+              ": it is no build folder of CMake, as it has no CMakeCache.txt; make it by: cmake -S SOURCES -B " +
+              printable(folder.string()));
+}
+
+/// The states of the sources: everything below their folder except build folders, hidden ones and folders of runs.
+FileStates states_of_sources(const WatchedBuild& build) {
+  FileStates states;
+  std::error_code gone;
+  for (fs::recursive_directory_iterator entry(build.sources, fs::directory_options::skip_permission_denied, gone), end;
+       !gone && entry != end; entry.increment(gone)) {
+    if (entry->is_directory(gone) && !holds_sources(entry->path())) entry.disable_recursion_pending();
+    if (entry->is_regular_file(gone)) add(entry->path(), states);
+  }
+  return states;
+}
+
+/// What an open page of `marrow watch` shows. It looks for a new state every second.
+struct PageState {
+  std::string report;  ///< the last good report, relative to the page; empty if there is none yet
+  std::string doing;   ///< what is done now; empty: nothing, it waits for a change
+  std::string fault;   ///< what the last try ended with; empty if it was good
+};
+
+/// A page that was opened from a disk may not read files, but it may load scripts. So the state is a script, which the
+/// page loads again and again.
+constexpr const char* kPage = R"(<!DOCTYPE html>
+<meta charset="utf-8">
+<meta name="viewport" content="width=device-width, initial-scale=1">
+<title></title>
+<style>
+  html, body { margin: 0; height: 100%; font: 14px system-ui, sans-serif; }
+  body { display: flex; flex-direction: column; }
+  #bar { padding: 6px 12px; background: #eef3f7; color: #223; }
+  #fault { margin: 0; padding: 8px 12px; max-height: 40vh; overflow: auto; background: #fdecea; color: #7a1410;
+    white-space: pre-wrap; font: 12px ui-monospace, monospace; }
+  #fault:empty { display: none; }
+  iframe { flex: 1; border: 0; width: 100%; }
+  @media (prefers-color-scheme: dark) {
+    #bar { background: #1d2730; color: #dde; }
+    #fault { background: #3b1512; color: #f5b5ae; }
+  }
+</style>
+<div id="bar" role="status">waiting for the first result</div>
+<pre id="fault" role="alert"></pre>
+<iframe title="report"></iframe>
+<script>
+  const title = TITLE, frame = document.querySelector('iframe'), bar = document.querySelector('#bar');
+  let shown = '', seen = '', place = 0;
+  document.title = title;
+  frame.addEventListener('load', () => {
+    try { frame.contentWindow.scrollTo(0, place); } catch (e) { /* the browser keeps the files apart */ }
+  });
+  function marrowState(state) {
+    if (JSON.stringify(state) === seen) return;
+    seen = JSON.stringify(state);
+    bar.textContent = title + ': ' + (state.doing || (state.fault ? 'a fault; below is the last good result' :
+      'up to date since ' + state.at)) ;
+    document.querySelector('#fault').textContent = state.fault;
+    document.title = (state.fault ? '✗ ' : state.doing ? '… ' : '✓ ') + title;
+    if (state.report && state.report !== shown) {
+      try { place = frame.contentWindow.scrollY; } catch (e) { place = 0; }
+      shown = frame.src = state.report;
+    }
+  }
+  function look() {
+    const script = document.createElement('script');
+    script.src = 'state.js?' + Date.now();
+    script.onload = script.onerror = () => { script.remove(); setTimeout(look, 1000); };
+    document.head.append(script);
+  }
+  look();
+</script>
+)";
+
+/// Writes index.html into the folder of a watch.
+void write_page(const std::filesystem::path& folder, const std::string& title) {
+  std::string page = kPage;
+  // The text of a script must not contain the end of the element.
+  std::string name = nlohmann::json(title).dump(-1, ' ', true, nlohmann::json::error_handler_t::replace);
+  for (std::size_t at = 0; (at = name.find('<', at)) != std::string::npos;) name.replace(at, 1, "\\u003c");
+  page.replace(page.find("TITLE"), 5, name);
+  write_text_file(folder / "index.html", page);
+}
+
+void write_state(const std::filesystem::path& folder, const PageState& state) {
+  const std::time_t now = std::time(nullptr);
+  char clock[16];
+  std::strftime(clock, sizeof clock, "%H:%M:%S", std::localtime(&now));
+  const nlohmann::json json = {{"report", state.report}, {"doing", state.doing}, {"fault", state.fault}, {"at", clock}};
+  write_text_file(folder / "state.js",
+                  "marrowState(" + json.dump(-1, ' ', true, nlohmann::json::error_handler_t::replace) + ")\n");
+}
+
 constexpr auto kPause = std::chrono::milliseconds(300);
+
 constexpr int kWrongVerdict = 3;  // exit code of a run that made everything
+
 constexpr int kStopped = 130;
 
 struct WatchRequest {

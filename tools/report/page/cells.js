@@ -9,11 +9,7 @@ import * as Verdict from './verdict.js';
 
 const OUTCOMES = ['success', 'missed', 'failed', 'done'];
 
-const NAMES = {
-  pictures: 'pictures',
-  scene: '3D',
-  convergence: 'curve'
-};
+const NAMES = Object.freeze({pictures: 'pictures', scene: '3D', convergence: 'curve'});
 
 const longest = (texts, least, most) =>
     Math.min(most, texts.reduce((length, text) => Math.max(length, String(text).length), least));

@@ -9,19 +9,9 @@ import * as Dagre from 'dagre';
 
 import {button, el, row, svg, table} from './dom.js';
 
-const BOX = {
-  width: 186,
-  height: 46,
-  line: 16
-};
+const BOX = Object.freeze({width: 186, height: 46, line: 16});
 const SMALLEST = 0.7;  // the scale of the drawing at which its text can still be read
-const GAPS = {
-  nodesep: 26,
-  edgesep: 12,
-  ranksep: 46,
-  marginx: 6,
-  marginy: 6
-};
+const GAPS = Object.freeze({nodesep: 26, edgesep: 12, ranksep: 46, marginx: 6, marginy: 6});
 
 // Edges between the same two nodes are drawn as one, with all their ports.
 function joined(graph) {
@@ -40,7 +30,7 @@ const heightOf = (node) => BOX.height + BOX.line * Object.keys(node.differs || {
 // dagre's plan of items with a width and height: in `plan.node(id)`, the middle {x, y}.
 function planOf(items, ends) {
   const plan = new Dagre.graphlib.Graph();
-  plan.setGraph(GAPS);
+  plan.setGraph({...GAPS});
   for (const [id, {width, height}] of items) plan.setNode(id, {width, height});
   for (const [from, to] of ends) plan.setEdge(from, to, {});
   Dagre.layout(plan);

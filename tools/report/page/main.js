@@ -5,8 +5,7 @@ import * as Compared from './compared.js';
 import * as Curves from './curves.js';
 import * as Data from './data.js';
 import * as Detail from './detail.js';
-import * as Dom from './dom.js';
-import {el} from './dom.js';
+import {button, checkbox, choice, command, el, row, select, startTooltip, table, valueTable} from './dom.js';
 import * as Figures from './figures.js';
 import * as Glossary from './glossary.js';
 import * as Graph from './graph.js';
@@ -52,13 +51,13 @@ function metricFigure(data, kinds, extra, draw) {
   const toolbar = el('div', {class: 'toolbar'}, Summary.metricChoice(data, (i) => {
     state.metric = i;
     again();
-  }), extra && Dom.choice(extra.label, extra.options, state.extra, (value) => {
-    state.extra = value;
-    again();
-  }), Dom.choice('Scale', kinds, state.kind, (kind) => {
-    state.kind = kind;
-    again();
-  }));
+  }), extra && choice(extra.label, extra.options, state.extra, (value) => {
+        state.extra = value;
+        again();
+      }), choice('Scale', kinds, state.kind, (kind) => {
+                       state.kind = kind;
+                       again();
+                     }));
   return el('div', {}, toolbar, place);
 }
 
@@ -155,15 +154,15 @@ function closer(data) {
   const state = {at: 0, each: false};
   const pickers = [];
   const picker = () => {
-    const box = Dom.select(
+    const box = select(
         'Case and start', data.lookedAt.map((pair, i) => [i, Data.pairName(data, pair)]), 0, (i) => choose(Number(i)));
     pickers.push(box.box);
     return data.lookedAt.length < 2 ?
         null :
-        el('div', {class: 'toolbar picker'}, box, Dom.button('Previous', () => choose(state.at - 1)),
-           Dom.button('Next', () => choose(state.at + 1)));
+        el('div', {class: 'toolbar picker'}, box, button('Previous', () => choose(state.at - 1)),
+           button('Next', () => choose(state.at + 1)));
   };
-  const each = () => (data.variants.length > 1 ? Dom.checkbox('each scaled to 0–1', false, (on) => {
+  const each = () => (data.variants.length > 1 ? checkbox('each scaled to 0–1', false, (on) => {
     state.each = on;
     curves();
   }) : null);
@@ -274,15 +273,14 @@ function repeat(data) {
     ['Machine', [machine.cpu, machine.cores && machine.cores + ' cores', machine.cpu_level].filter(Boolean).join(', ')]
   ].filter((line) => line[1] !== undefined && line[1] !== null && line[1] !== '');
   return section(
-      'repeat', 'Repeat it', null, experiment.command && Dom.command(experiment.command),
-      el('div', {class: 'scroll'}, Dom.valueTable(lines.map(([name, value]) => [name, String(value)]))),
+      'repeat', 'Repeat it', null, experiment.command && command(experiment.command),
+      el('div', {class: 'scroll'}, valueTable(lines.map(([name, value]) => [name, String(value)]))),
       file(data.is_run ? 'The run’s settings' : 'The experiment’s file', experiment.text),
       file('The pipeline’s file', experiment.pipeline_text), ...Recipes.all(data),
       (experiment.plugins || []).length > 0 &&
           el('details', {}, el('summary', {}, 'Plugins and their build ids'),
-             Dom.table(
-                 {}, null, null,
-                 experiment.plugins.map((plugin) => Dom.row(plugin.file, [el('code', {}, plugin.build_id)])))));
+             table({}, null, null, experiment.plugins.map((plugin) => row(plugin.file, [el('code', {},
+                                                                                           plugin.build_id)])))));
 }
 
 function summary(data) {
@@ -369,7 +367,7 @@ function followScroll() {
 
 async function start() {
   startTheme();
-  Dom.startTooltip();
+  startTooltip();
   try {
     await build(Data.load());
     followScroll();

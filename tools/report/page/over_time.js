@@ -104,10 +104,10 @@ const table = (figures, columns) => Dom.table(
     figures.map((figure) => el('tr', {}, columns.map(([, text]) => el('td', {}, text(figure))))));
 
 const NOTES = {
-  sequences: 'Differences are second − first. Beneath each pair of curves is the difference; its band holds 95 % ' +
-      'of single differences, its dashed line is the mean.',
-  trials: 'Differences are second − first, one thin curve a trial. The wide band holds the whole mean difference in ' +
-      '95 %, the narrow one that of each single time.'
+  sequences: 'Differences are second − first. Beneath each pair of curves is the difference; its band holds ' +
+      '95 % of single differences, its dashed line is the mean.',
+  trials: 'Differences are second − first, one thin curve a trial. The wide band holds the whole mean difference ' +
+      'in 95 %, the narrow one that of each single time.'
 };
 
 function figureOf(figure, kind) {

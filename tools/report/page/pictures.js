@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Two pictures of one case on top of each other (wipe), in turn (blink) or side by side; by mouse, touch or keyboard.
-import * as Dom from './dom.js';
-import {el} from './dom.js';
+import {button, choice, dragAcross, el, select} from './dom.js';
 import * as Plots from './plots.js';
 
 const BLINK_MS = 700;  // slower than three times a second
@@ -10,11 +9,11 @@ const ZOOMS = [['1', 'fit'], ['2', '2×'], ['4', '4×']];
 // One side: the choice of a variant and of a picture's name.
 function sideControls(data, letter, side, names, many, changed) {
   const variants =
-      Dom.select('Variant ' + letter, data.variants.map((variant, i) => [i, variant.name]), side.variant, (value) => {
+      select('Variant ' + letter, data.variants.map((variant, i) => [i, variant.name]), side.variant, (value) => {
         side.variant = Number(value);
         changed();
       });
-  const pictures = Dom.select('Picture ' + letter, names.map((name) => [name, name]), side.name, (value) => {
+  const pictures = select('Picture ' + letter, names.map((name) => [name, name]), side.name, (value) => {
     side.name = value;
     changed();
   });
@@ -55,19 +54,19 @@ export class Comparer {
 
   build() {
     const update = () => this.update();
-    const modes = Dom.choice(
+    const modes = choice(
         'Mode', [['wipe', 'Wipe'], ['blink', 'Blink'], ['side', 'Side by side']], this.mode,
         (mode) => this.setMode(mode));
-    const zoom = Dom.choice('Zoom', ZOOMS, '1', (value) => this.stage.style.setProperty('--zoom', value));
-    const common = Dom.select('Picture', this.names.map((name) => [name, name]), this.sides[0].name, (name) => {
+    const zoom = choice('Zoom', ZOOMS, '1', (value) => this.stage.style.setProperty('--zoom', value));
+    const common = select('Picture', this.names.map((name) => [name, name]), this.sides[0].name, (name) => {
       this.sides.forEach((side) => (side.name = name));
       update();
     });
-    this.pause = Dom.button(this.running ? 'Pause' : 'Run', () => {
+    this.pause = button(this.running ? 'Pause' : 'Run', () => {
       this.running = !this.running;
       this.pause.textContent = this.running ? 'Pause' : 'Run';
     });
-    this.flip = Dom.button('Switch', () => this.turn());
+    this.flip = button('Switch', () => this.turn());
     this.images = [0, 1].map((i) => el('img', {
                                class: 'side side-' +
                                    'ab'[i],
@@ -111,7 +110,7 @@ export class Comparer {
   }
 
   listen() {
-    Dom.dragAcross(this.stage, (percent) => this.mode === 'wipe' && this.setWipe(percent));
+    dragAcross(this.stage, (percent) => this.mode === 'wipe' && this.setWipe(percent));
     this.stage.addEventListener('keydown', (event) => {
       const step = {ArrowLeft: -2, ArrowRight: 2, PageDown: -10, PageUp: 10, Home: -100, End: 100}[event.key];
       if (this.mode === 'wipe' && step)

@@ -47,11 +47,7 @@ function visible(lane, from, to, least) {
   return shown.map((one) => (one.count === 1 ? one.first : one));
 }
 
-const KINDS = {
-  cached: 'its result was kept',
-  store: 'the store of results',
-  pass: 'a pass of its body'
-};
+const KINDS = Object.freeze({cached: 'its result was kept', store: 'the store of results', pass: 'a pass of its body'});
 
 function tipOf(bar) {
   if (bar.count) return bar.count + ' short calls\nwithin ' + seconds(bar.end - bar.begin);

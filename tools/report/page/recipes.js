@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The recipes of the page, from <script type="application/json" id="recipes">: for each variant a pipeline file that
 // makes its run again. `marrow recipe` reads them too.
-import * as Dom from './dom.js';
-import {el} from './dom.js';
+import {button, el, save} from './dom.js';
 
 const idOf = (variant) => 'recipe-' + variant;
 
@@ -26,8 +25,7 @@ function shown(data, {name, recipe}, variant) {
   const file = (name || data.experiment.name || 'run') + '.yaml';
   return el(
       'details', {id: idOf(variant)}, el('summary', {}, title),
-      el('p', {},
-         Dom.button('Save as ' + file, () => Dom.save(recipe, file.replace(/[\/\\]/g, '_'), 'application/yaml'))),
+      el('p', {}, button('Save as ' + file, () => save(recipe, file.replace(/[\/\\]/g, '_'), 'application/yaml'))),
       el('pre', {class: 'file', tabindex: 0}, recipe));
 }
 

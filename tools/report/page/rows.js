@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // A table of any number of rows. Only visible rows are drawn, so that thousands are sorted and filtered at once. Screen
 // readers are told how many rows there are, and which are visible. The arrow keys move from row to row.
-import * as Dom from './dom.js';
-import {el} from './dom.js';
+import {button, el} from './dom.js';
 import * as Glossary from './glossary.js';
 
 const MORE = 4;  // further rows that are drawn above and below the visible ones, so that scrolling shows no gap
@@ -24,7 +23,7 @@ export function order(items, key, down) {
 export const sortHead = (column, pressed, attributes) => el(
     'th',
     {scope: 'col', class: column.number ? 'number' : null, 'data-tip': Glossary.meaning(column.title), ...attributes},
-    Dom.button(
+    button(
         [column.title, column.unit && el('small', {}, ' ' + column.unit)].filter(Boolean), pressed, {class: 'sort'}));
 
 // Tells by which of these heads the rows are sorted.

@@ -5,11 +5,7 @@ import {el, number, percent, row} from './dom.js';
 import * as Glossary from './glossary.js';
 import * as Summary from './summary.js';
 
-const CLASSES = {
-  trusted: 'success',
-  doubtful: 'doubtful',
-  wrong: 'failed'
-};
+const CLASSES = Object.freeze({trusted: 'success', doubtful: 'doubtful', wrong: 'failed'});
 
 export const failure = (probability) =>
     'failure ' + (Number.isFinite(probability) ? percent(probability, probability < 0.0995 ? 1 : 0) : 'not known');

@@ -3,14 +3,86 @@
 // chosen step. Its parts are panels: each shows a part of the draft's document and changes it.
 import {el} from '../../report/page/dom.js';
 
-import * as CaseSteps from './case_steps.js';
 import {CaseDraft} from './draft.js';
 import * as Shell from './shell.js';
+
+const entries = (document) => Object.entries(document.fragments || {});
+const listed = (names, most = 3) =>
+    names.slice(0, most).join(', ') + (names.length > most ? ' and ' + (names.length - most) + ' more' : '');
+
+function boneLacks({document}) {
+  const all = entries(document);
+  if (!all.length) return 'no bone yet';
+  const empty = all.filter(([, {seeds, label, surface}]) => label === undefined && !surface && !(seeds || []).length);
+  if (empty.length) return 'no seed in ' + listed(empty.map(([name]) => name));
+  return all.every(([, {register}]) => register === false) ? 'no bone is to be registered' : '';
+}
+
+function viewLacks({document}) {
+  const views = document.views || [], without = views.filter(({camera}) => !camera || !Object.keys(camera).length);
+  if (!views.length) return 'no X-ray yet';
+  return without.length ? 'no camera: ' + listed(without.map(({name}) => name)) : '';
+}
+
+// A case without a CT has labels or surfaces in its place.
+const hasBonesOfFiles = ({document}) => entries(document).some(([, one]) => one.label !== undefined || one.surface);
+
+// `lacks`: what is missing, '' if nothing is. `found`: set by the panels, such as the result of a check.
+export const STEPS = [
+  {
+    name: 'ct',
+    title: 'CT',
+    lacks: (draft) => draft.ct_fault                ? 'cannot be read' :
+        draft.document.ct || hasBonesOfFiles(draft) ? '' :
+                                                      'no CT yet'
+  },
+  {name: 'bones', title: 'Bones', lacks: boneLacks}, {name: 'xrays', title: 'X-rays', lacks: viewLacks}, {
+    name: 'check',
+    title: 'Check',
+    lacks: (draft) =>
+        (viewLacks(draft) ? 'needs X-rays' :
+             draft.check  ? draft.check.lacks :
+                            'not checked yet')
+  },
+  {name: 'save', title: 'Save', lacks: (draft) => (draft.is_saved && draft.document.views ? '' : 'not saved yet')}
+];
+
+// The rail: a button for each step. show(name) is called with the chosen one.
+function railOf(draft, show) {
+  const buttons = STEPS.map(({name, title}, i) => {
+    const state = el('small', {}), mark = el('span', {class: 'rail-mark', 'aria-hidden': 'true'}, i + 1);
+    const button = el(
+        'button', {type: 'button', 'data-step': name, onclick: () => choose(name)}, mark, el('span', {}, title), state);
+    return {name, button, state, mark, number: i + 1};
+  });
+  const choose = (name) => {
+    for (const one of buttons)
+      if (one.name === name)
+        one.button.setAttribute('aria-current', 'step');
+      else
+        one.button.removeAttribute('aria-current');
+    show(name);
+  };
+  const update = () => STEPS.forEach(({lacks}, i) => {
+    const {button, state, mark, number} = buttons[i], missing = lacks(draft);
+    state.textContent = missing || 'done';
+    mark.textContent = missing ? number : '✓';
+    button.classList.toggle('done', !missing);
+  });
+  draft.addEventListener('steps', update);
+  return {
+    element: el('nav', {class: 'rail', 'aria-label': 'Steps of the case'}, buttons.map(({button}) => button)),
+    update,
+    choose,
+    // The check comes later, and finds nothing in most cases.
+    firstOpen: () => (STEPS.find(({name, lacks}) => name !== 'check' && lacks(draft)) || STEPS.at(-1)).name
+  };
+}
 
 const panels = [];
 const keys = [
   ['Ctrl+z', 'undo', () => draft.step('undo')], ['Ctrl+y or Ctrl+Z', 'redo', () => draft.step('redo')],
-  ['1 or 2 or 3 or 4 or 5', 'a step of the rail', (event) => rail.choose(CaseSteps.STEPS[Number(event.key) - 1].name)]
+  ['1 or 2 or 3 or 4 or 5', 'a step of the rail', (event) => rail.choose(STEPS[Number(event.key) - 1].name)]
 ];
 let draft = null, open = [], rail = null, leaving = null;
 
@@ -37,7 +109,7 @@ function bar() {
 
 // The tools of each step; those of one step are shown.
 function toolsOf(parts) {
-  const boxes = CaseSteps.STEPS.map(
+  const boxes = STEPS.map(
       ({name}) => el(
           'div', {class: 'case-tools', 'data-of-step': name, hidden: true},
           parts.filter(({step}) => step === name)
@@ -59,7 +131,7 @@ async function show(place, parameters, first) {
       el('div', {class: 'case-stage'},
          el('section', {class: 'stage-slices', 'aria-label': 'Slices and surfaces'}, shown.slices),
          el('section', {class: 'stage-xrays', 'aria-label': 'X-ray pictures'}, shown.xrays));
-  rail = CaseSteps.rail(draft, (step) => {
+  rail = railOf(draft, (step) => {
     tools.show(step);
     stage.dataset.step = step;
   });

@@ -4,8 +4,7 @@ import * as Dom from '../../report/page/dom.js';
 import {el, number} from '../../report/page/dom.js';
 
 import * as CasePage from './case.js';
-import {CtState} from './ct_state.js';
-import {LabelsState} from './labels_state.js';
+import {CtState, LabelsState} from './draft.js';
 import * as PointList from './point_list.js';
 import * as Shell from './shell.js';
 import * as SliceGeometry from './slice_geometry.js';

@@ -6,7 +6,6 @@ import './ct_panel.js';
 import './labels_panel.js';
 import './fragments_panel.js';
 import './segmentation_panel.js';
-import './ct_landmarks.js';
 import './save_panel.js';
 import './xrays.js';
 import './xray_views.js';

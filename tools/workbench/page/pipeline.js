@@ -4,12 +4,10 @@ import * as Dom from '../../report/page/dom.js';
 import {el} from '../../report/page/dom.js';
 import * as Graph from '../../report/page/graph.js';
 
-import * as NodeOutput from './node_output.js';
 import * as PipelineList from './pipeline_list.js';
 import * as PipelineNode from './pipeline_node.js';
-import * as PipelineRuns from './pipeline_runs.js';
 import {PipelineText} from './pipeline_text.js';
-import {GraphView} from './pipeline_view.js';
+import {follow, GraphView, inputField, mark, nameAsSeen} from './pipeline_view.js';
 import * as Ask from './server.js';
 import * as Shell from './shell.js';
 
@@ -85,7 +83,7 @@ class Page {
   draw(graph) {
     const focused = document.activeElement && document.activeElement.dataset && document.activeElement.dataset.node;
     this.graph = Graph.draw(graph, (node) => this.choose(node.id)).querySelector('svg');
-    this.graph.querySelectorAll('[data-node]').forEach(PipelineRuns.nameAsSeen);
+    this.graph.querySelectorAll('[data-node]').forEach(nameAsSeen);
     this.view.element.hidden = false;
     this.view.set(this.graph);
     this.markChosen();
@@ -182,7 +180,7 @@ class Page {
     this.countInputs();
     this.inputBox.replaceChildren(
         ...(this.state.inputs.length ?
-                this.state.inputs.map((one) => PipelineRuns.inputField(one, this.inputs[one.name] || '', changed)) :
+                this.state.inputs.map((one) => inputField(one, this.inputs[one.name] || '', changed)) :
                 [el('p', {class: 'note'}, 'This pipeline has no inputs.')]));
   }
 
@@ -220,7 +218,7 @@ class Page {
 
   showPlan() {
     for (const [id, {state, text}] of Object.entries(this.plan.nodes))
-      PipelineRuns.mark(this.graph, id, state, state === 'function' || state === 'not_needed' ? ' ' : '', text);
+      mark(this.graph, id, state, state === 'function' || state === 'not_needed' ? ' ' : '', text);
     const {cached, to_run, may_run, seconds} = this.plan;
     this.status.textContent = to_run + may_run === 0 ?
         'everything is up to date' :
@@ -236,7 +234,7 @@ class Page {
       this.run.disabled = true;
       document.documentElement.dataset.run = 'running';
       try {
-        const result = await PipelineRuns.follow('Run ' + this.state.name, job, () => this.graph);
+        const result = await follow('Run ' + this.state.name, job, () => this.graph);
         this.showResult(result, command);
         document.documentElement.dataset.run = result.status;
       } catch (error) {
@@ -272,7 +270,7 @@ class Page {
   // Shows the outputs of the chosen node, if they are known.
   async look() {
     const id = this.known(), count = ++this.lookCount;
-    NodeOutput.clear();
+    PipelineNode.clearOutputs();
     const say = (text) => this.outputBox.replaceChildren(el('p', {class: 'note'}, text));
     if (!id) return say('Choose a node to see what it made.');
     const planned = this.plan && this.plan.nodes[id];
@@ -283,7 +281,8 @@ class Page {
     try {
       const {job} = await Ask.post('api/pipeline/look', {file: this.file, inputs: this.inputs, node: id});
       const outputs = await Ask.follow(job);
-      if (count === this.lookCount && this === page) this.outputBox.replaceChildren(...NodeOutput.show(id, outputs));
+      if (count === this.lookCount && this === page)
+        this.outputBox.replaceChildren(...PipelineNode.showOutputs(id, outputs));
     } catch (error) {
       if (count === this.lookCount) say(error.message);
     }
@@ -370,7 +369,7 @@ Shell.page('pipeline', {
   },
   leave() {
     if (page) page.leave();
-    NodeOutput.clear();
+    PipelineNode.clearOutputs();
     page = null;
   },
   keys: [

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The pipelines of the folder, and marrow's own, which are copied into it.
-import * as Dom from '../../report/page/dom.js';
-import {el} from '../../report/page/dom.js';
+import {button, el} from '../../report/page/dom.js';
 
 import * as Ask from './server.js';
 import * as Shell from './shell.js';
@@ -36,8 +35,7 @@ function row(one, files, title) {
       el('div', {class: 'actions'},
          files.includes(file) ?
              el('a', {class: 'as-button', href: Shell.addressOf('pipeline', file)}, 'Open ' + file) :
-             Dom.button(
-                 'Copy ' + file + ' into this folder', copy, {'data-copy': one.name, class: title && 'primary'})));
+             button('Copy ' + file + ' into this folder', copy, {'data-copy': one.name, class: title && 'primary'})));
 }
 
 function ownSection(own, files) {

@@ -5,8 +5,8 @@ import {el} from '../../report/page/dom.js';
 
 import * as Geometry from './geometry.js';
 import {PlacedCase} from './place_case.js';
+import * as PlaceMotion from './place_controls.js';
 import {PlaceControls} from './place_controls.js';
-import * as PlaceMotion from './place_motion.js';
 import * as Ask from './server.js';
 import * as Shell from './shell.js';
 

@@ -4,8 +4,7 @@ import * as Dom from '../../report/page/dom.js';
 
 import {CaseDraft} from './draft.js';
 import * as Geometry from './geometry.js';
-import {PlaceControls} from './place_controls.js';
-import * as PlaceMotion from './place_motion.js';
+import {angleAbout, PlaceControls, roll, rollAngle, shiftInDepth, shiftInView, turnInView} from './place_controls.js';
 import {PlaceSequence} from './place_sequence.js';
 import {PlaceSteps} from './place_steps.js';
 import {PlaceView} from './place_view.js';
@@ -63,8 +62,8 @@ export class PlacedCase extends PlaceControls {
       poses: () => ({...this.placed}),
       drag: (drag) => this.drag(drag),
       dragEnded: (drag) => this.dragEnded(drag),
-      wheel: (view, notches) => this.byKeys(
-          view, 'move in depth', ({middle}) => PlaceMotion.shiftInDepth(view.camera, middle, notches * this.step)),
+      wheel: (view, notches) =>
+          this.byKeys(view, 'move in depth', ({middle}) => shiftInDepth(view.camera, middle, notches * this.step)),
       chosen: (view) => (this.active = view),
       painted: (view, since) => this.painted(view, since),
       failed: (error) => this.failed(error)
@@ -112,10 +111,10 @@ export class PlacedCase extends PlaceControls {
   drag(drag) {
     if (!this.bones().length) return;
     const {camera} = drag.view, {middle, axis} = this.hold(drag.poses), {from, to, kind} = drag;
-    if (kind === 'turn') drag.turned += PlaceMotion.angleAbout(camera, middle, drag.previous, to);
-    const motion = kind === 'shift' ? PlaceMotion.shiftInView(camera, middle, from, to) :
-        kind === 'roll' ? PlaceMotion.roll(axis, middle, PlaceMotion.rollAngle(camera, axis, middle, from, to)) :
-                          PlaceMotion.turnInView(camera, middle, drag.turned);
+    if (kind === 'turn') drag.turned += angleAbout(camera, middle, drag.previous, to);
+    const motion = kind === 'shift' ? shiftInView(camera, middle, from, to) :
+        kind === 'roll'             ? roll(axis, middle, rollAngle(camera, axis, middle, from, to)) :
+                                      turnInView(camera, middle, drag.turned);
     drag.moved = true;
     this.move(drag.poses, motion, true);
   }

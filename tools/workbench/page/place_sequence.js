@@ -1,12 +1,156 @@
 // SPDX-License-Identifier: Apache-2.0
 // A sequence on the page "Place": the frame that is shown, the keyframes of the bones, and their tracking. All of it is
 // kept in the draft as `sequence`: {views: {VIEW: {images, pattern}}, frame_rate_hz, keyframes: {BONE: {FRAME: {pose,
-// used}}}, tracked: the folder with the tracked poses}. PlaceBetween says what `used` means.
-import * as PlaceBetween from './place_between.js';
-import {PlaceFrames} from './place_frames.js';
+// used}}}, tracked: the folder with the tracked poses}. `used` is explained at at().
+import {minus, moved, plus, times} from './geometry.js';
 import {PlaceTimeline} from './place_timeline.js';
 import * as Ask from './server.js';
 import * as Shell from './shell.js';
+
+// [x, y, z, w] of a motion's rotation, by its largest component.
+function quaternion(m) {
+  const squares = [
+    1 + m[0][0] - m[1][1] - m[2][2], 1 - m[0][0] + m[1][1] - m[2][2], 1 - m[0][0] - m[1][1] + m[2][2],
+    1 + m[0][0] + m[1][1] + m[2][2]
+  ];
+  const at = squares.indexOf(Math.max(...squares)), [x, y, z, w] = [
+    [squares[0], m[1][0] + m[0][1], m[0][2] + m[2][0], m[2][1] - m[1][2]],
+    [m[1][0] + m[0][1], squares[1], m[2][1] + m[1][2], m[0][2] - m[2][0]],
+    [m[0][2] + m[2][0], m[2][1] + m[1][2], squares[2], m[1][0] - m[0][1]],
+    [m[2][1] - m[1][2], m[0][2] - m[2][0], m[1][0] - m[0][1], squares[3]]
+  ][at];
+  const length = Math.hypot(x, y, z, w);
+  return [x, y, z, w].map((value) => value / length);
+}
+
+function rotationOf([x, y, z, w]) {
+  return [
+    [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+    [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+    [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)]
+  ];
+}
+
+// Slerp: the shorter way, at constant speed.
+function slerp(a, b, share) {
+  let cosine = a.reduce((sum, value, i) => sum + value * b[i], 0);
+  const sign = cosine < 0 ? -1 : 1;
+  cosine = Math.min(1, Math.abs(cosine));
+  const angle = Math.acos(cosine), sine = Math.sin(angle);
+  const [from, to] =
+      sine < 1e-9 ? [1 - share, share] : [Math.sin((1 - share) * angle) / sine, Math.sin(share * angle) / sine];
+  const mixed = a.map((value, i) => from * value + to * sign * b[i]), length = Math.hypot(...mixed);
+  return mixed.map((value) => value / length);
+}
+
+// Interpolates the rotation by slerp, and the middle of the bone on a straight line. share 0: the first pose, 1: the
+// second.
+export function between(first, second, share, middle_mm) {
+  const rotation = rotationOf(slerp(quaternion(first), quaternion(second), share));
+  const begin = moved(first, middle_mm), end = moved(second, middle_mm);
+  const middle = plus(begin, times(minus(end, begin), share));
+  const shift = minus(middle, rotation.map((row) => row.reduce((sum, value, i) => sum + value * middle_mm[i], 0)));
+  return [...rotation.map((row, i) => [...row, shift[i]]), [0, 0, 0, 1]];
+}
+
+// What is known in the frame itself: {pose, is}, or null.
+function known(frame, keyframes, tracked) {
+  const keyframe = keyframes[frame], found = (tracked || [])[frame - 1];
+  if (keyframe && !(keyframe.used && found)) return {pose: keyframe.pose, is: 'keyframe'};
+  if (found) return {pose: found, is: keyframe ? 'tracked from the keyframe' : 'tracked'};
+  return null;
+}
+
+// The pose of a bone in a frame, from keyframes {FRAME: {pose, used}}, where `used` says that the tracking used the
+// keyframe, and from `tracked`: the poses from frame 1 on, with null where the bone was lost. Returns {pose, is}; null
+// if nothing is known in any frame.
+function at(frame, frames, bone, keyframes, tracked) {
+  const here = known(frame, keyframes, tracked);
+  if (here) return here;
+  let before = frame - 1, after = frame + 1, one = null, other = null;
+  while (before >= 1 && !(one = known(before, keyframes, tracked))) --before;
+  while (after <= frames && !(other = known(after, keyframes, tracked))) ++after;
+  const lost = tracked ? 'lost; ' : '';
+  if (one && other)
+    return {
+      pose: between(one.pose, other.pose, (frame - before) / (after - before), bone.middle_mm),
+      is: lost + `between frames ${before} and ${after}`
+    };
+  if (one || other) return {pose: (one || other).pose, is: lost + `as in frame ${one ? before : after}`};
+  return null;
+}
+
+// The images of a sequence's frames. They are read in blocks: the wanted one, then the next one ahead of time. The
+// blocks that were used last stay in memory, up to a limit.
+class PlaceFrames {
+  // views: [{name, step_px}]; sources: {VIEW: {images, pattern}}
+  constructor(casePath, views, sources, frames) {
+    Object.assign(this, {casePath, views, sources, frames, blocks: new Map(), stopped: new AbortController()});
+  }
+
+  // The images of a frame, {VIEW: Uint16Array}.
+  async get(frame) {
+    const block = this.blockOf(frame), at = frame - 1 - block * PlaceFrames.BLOCK;
+    const images = await this.load(block);
+    return Object.fromEntries(
+        Object.entries(images).map(([name, {bytes, size}]) => [name, new Uint16Array(bytes, at * size, size / 2)]));
+  }
+
+  blockOf(frame) {
+    return Math.floor((frame - 1) / PlaceFrames.BLOCK);
+  }
+
+  // Reads the block behind the nearer end of the present one.
+  ahead(frame) {
+    const block = this.blockOf(frame), at = frame - 1 - block * PlaceFrames.BLOCK;
+    const next = at >= PlaceFrames.BLOCK / 2 ? block + 1 : block - 1;
+    if (next >= 0 && next * PlaceFrames.BLOCK < this.frames) this.load(next).catch(() => {});
+  }
+
+  // A block that failed is requested again the next time.
+  load(block) {
+    const held = this.blocks.get(block) || {};
+    this.blocks.delete(block);
+    this.blocks.set(block, held);  // the last one was used last
+    if (!held.loading) {
+      held.loading = this.read(block);
+      held.loading.then((images) => {
+        held.bytes = Object.values(images).reduce((sum, one) => sum + one.bytes.byteLength, 0);
+        this.forget(block);
+      }, () => this.blocks.delete(block));
+    }
+    return held.loading;
+  }
+
+  async read(block) {
+    const first = block * PlaceFrames.BLOCK + 1, last = Math.min(this.frames, first + PlaceFrames.BLOCK - 1);
+    const images = await Promise.all(this.views.map(async ({name, step_px}) => {
+      const {bytes, about} = await Ask.bytes(
+          'api/place/frames', {case: this.casePath, view: name, ...this.sources[name], first, last, step_px},
+          this.stopped.signal);
+      return [name, {bytes, size: about.bytes}];
+    }));
+    return Object.fromEntries(images);
+  }
+
+  // Forgets the blocks that were not used for the longest time. `block` stays.
+  forget(block) {
+    let bytes = [...this.blocks.values()].reduce((sum, one) => sum + (one.bytes || 0), 0);
+    for (const [one, held] of [...this.blocks]) {
+      if (bytes <= PlaceFrames.MOST_BYTES) return;
+      if (one === block || !held.bytes) continue;
+      this.blocks.delete(one);
+      bytes -= held.bytes;
+    }
+  }
+
+  stop() {
+    this.stopped.abort();
+    this.blocks.clear();
+  }
+}
+PlaceFrames.BLOCK = 8;
+PlaceFrames.MOST_BYTES = 200e6;
 
 export class PlaceSequence {
   constructor(page) {
@@ -93,7 +237,7 @@ export class PlaceSequence {
 
   // {pose, is} of a bone in a frame.
   at(bone, frame) {
-    const found = PlaceBetween.at(frame, this.frames, bone, this.keyframes(bone.name), this.tracked[bone.name]);
+    const found = at(frame, this.frames, bone, this.keyframes(bone.name), this.tracked[bone.name]);
     return found || {pose: this.page.startOf(bone), is: 'the start'};
   }
   poses(frame = this.frame) {
@@ -173,7 +317,7 @@ export class PlaceSequence {
                                                                                          {pose}]) => [frame, pose]))]));
     // The poses in the first frame come from the keyframes alone, so that tracking again finds the same poses.
     const starts = Object.fromEntries(this.page.about.bones.map((bone) => {
-      const found = PlaceBetween.at(1, this.frames, bone, this.keyframes(bone.name), null);
+      const found = at(1, this.frames, bone, this.keyframes(bone.name), null);
       return [bone.name, found ? found.pose : this.page.startOf(bone)];
     }));
     const {views, frame_rate_hz} = this.kept;

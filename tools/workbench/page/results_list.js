@@ -2,13 +2,64 @@
 // The list of runs and comparisons: sorted by its heads, filtered, and two of them chosen to be compared.
 import * as Dom from '../../report/page/dom.js';
 import {el} from '../../report/page/dom.js';
+import * as Glossary from '../../report/page/glossary.js';
 import * as Summary from '../../report/page/summary.js';
 import * as Verdict from '../../report/page/verdict.js';
 
-import {ago} from './cases.js';
-import * as FigureWords from './figure_words.js';
+import {ago} from './home.js';
 import * as Ask from './server.js';
 import * as Shell from './shell.js';
+
+// The figures that say most about a pose, the first one most of all.
+const MOST_SAID = [
+  'mtre', 'rotation', 'translation', 'axial', 'along', 'rms', 'max', 'gap', 'angulation', 'shortening', 'predicted max',
+  'dice', 'matched percent', 'distance'
+];
+const LESS_IS_BETTER = ['mtre', 'rotation', 'translation', 'rms', 'max', 'gap'];
+const WORDS = Object.freeze({mtre: 'mTRE'});
+
+// "rotation" for rotation_deg: the unit stands behind the value.
+const plain = (name) => name.replace(/_(mm|deg|px)$/, '').replaceAll('_', ' ').toLowerCase();
+const inWords = (name) => WORDS[plain(name)] || plain(name);
+export const isLessBetter = (name) => LESS_IS_BETTER.includes(plain(name));
+
+// Small for figures that say much.
+export function rank(name) {
+  const place = MOST_SAID.indexOf(plain(name));
+  return place < 0 ? MOST_SAID.length : place;
+}
+
+const unitText = (unit) => (unit === 'deg' ? '°' : unit ? '\u00a0' + unit : '');
+export const withUnit = (value, unit) => Dom.number(value) + (Number.isFinite(value) ? unitText(unit) : '');
+
+// The word with its meaning to point at.
+export function term(name) {
+  const word = inWords(name), tip = Glossary.meaning(name);
+  return tip ? el('span', {class: 'term', tabindex: 0, 'data-tip': tip}, word) : word;
+}
+
+// Two values count as the same if they differ by less than this. `limit`: in mm, degrees or px; of others, the share of
+// the larger value.
+export const limitOf = (one, limit) =>
+    (['mm', 'deg', 'px'].includes(one.unit) ? limit : limit * Math.max(Math.abs(one.before), Math.abs(one.now)));
+
+// The figures of a run's row, [{name, unit, value, column}], those that say most first. Of several columns, such as the
+// stages of a registration, it takes the last.
+function ofRun(tables) {
+  const all = [];
+  for (const table of tables || [])
+    for (const one of table.rows) {
+      const last = one.values.findLastIndex((value) => Number.isFinite(value));
+      if (last >= 0)
+        all.push({
+          name: one.name,
+          unit: one.unit,
+          value: one.values[last],
+          column: table.columns.length > 1 ? table.columns[last] : ''
+        });
+    }
+  return all.sort((a, b) => rank(a.name) - rank(b.name));
+}
 
 const MOST_FIGURES = 3, MOST_CHANGES = 3;
 const SEVERITY = ['done', 'trusted', 'doubtful', 'wrong'];
@@ -48,9 +99,9 @@ export function folded(lines, most) {
 // "final: mTRE 0.12 mm, rotation 0.24°": the figures that say most, then all others folded away.
 function figuresCell(row) {
   if (row.sentences) return folded(row.sentences.map((text) => el('div', {}, text)), MOST_FIGURES);
-  const figures = FigureWords.ofRun(row.figures);
+  const figures = ofRun(row.figures);
   if (!figures.length) return '–';
-  const words = (one) => [FigureWords.term(one.name), ' ', el('strong', {}, FigureWords.withUnit(one.value, one.unit))];
+  const words = (one) => [term(one.name), ' ', el('strong', {}, withUnit(one.value, one.unit))];
   const first = figures.filter((one) => one.column === figures[0].column).slice(0, MOST_FIGURES);
   const rest = figures.filter((one) => !first.includes(one));
   const head =
@@ -94,13 +145,8 @@ const columns = (chosen, toggle) =>
           (row.case ? el('a', {href: Shell.addressOf('case', row.case), class: 'case-of-run'}, row.case) : '–')
     },
      {title: 'Changed options', key: (row) => (row.changes || []).length, cell: changesCell, wide: true},
-     {title: 'Verdict', key: severityOf, cell: verdictCell}, {
-       title: 'Key figures',
-       key: (row) => (FigureWords.ofRun(row.figures)[0] || {}).value,
-       cell: figuresCell,
-       wide: true
-     },
-     {
+     {title: 'Verdict', key: severityOf, cell: verdictCell},
+     {title: 'Key figures', key: (row) => (ofRun(row.figures)[0] || {}).value, cell: figuresCell, wide: true}, {
        title: 'When',
        key: (row) => -Date.parse(row.when),
        cell: (row) => el('time', {datetime: row.when, title: when(row.when)}, ago(row.when))

@@ -4,17 +4,15 @@
 import {button, command, el, labelled, number, select, shellPath, shellWord} from '../../report/page/dom.js';
 
 import * as CasePage from './case.js';
-import {CtState} from './ct_state.js';
+import {CtState} from './draft.js';
+import {SurfaceView} from './pipeline_node.js';
 import * as PointList from './point_list.js';
 import * as Ask from './server.js';
 import * as Shell from './shell.js';
-import {SurfaceView} from './surface_view.js';
 
 const METHODS = [['bone', 'by a threshold, as bone.yaml does'], ['femur', 'by a level set, as femur.yaml does']];
-const STAGES = {
-  coarse: 'on a coarse grid; the full grid is being computed',
-  full: 'on the grid of the CT'
-};
+const STAGES =
+    Object.freeze({coarse: 'on a coarse grid; the full grid is being computed', full: 'on the grid of the CT'});
 
 // The outlines of one result, requested slice by slice.
 function outlines(segmentation, colourOf) {

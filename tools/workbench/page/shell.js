@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // What surrounds all pages: the bar, notices, jobs, dialogs and keys. The address names the page and what it shows:
 // #case=cases/7&view=lateral
-import * as Dom from '../../report/page/dom.js';
-import {el} from '../../report/page/dom.js';
+import {button, el, startTooltip, valueTable} from '../../report/page/dom.js';
 import {startTheme} from '../../report/page/theme.js';
 
 import * as Ask from './server.js';
@@ -93,8 +92,8 @@ export const links = (name, paths, none) =>
 
 // Buttons to undo and redo: act(way) gets 'undo' or 'redo'. update(undo, redo) gets what each would change, or null.
 export function undoButtons(act) {
-  const undo = Dom.button('Undo', () => act('undo'), {'data-do': 'undo'});
-  const redo = Dom.button('Redo', () => act('redo'), {'data-do': 'redo'});
+  const undo = button('Undo', () => act('undo'), {'data-do': 'undo'});
+  const redo = button('Redo', () => act('redo'), {'data-do': 'redo'});
   const set = (box, what) => {
     box.disabled = what === null;
     box.title = what ? box.textContent + ': ' + what : 'There is nothing to ' + box.dataset.do;
@@ -112,7 +111,7 @@ export function undoButtons(act) {
 export function notice(text, kind) {
   const line =
       el('p', {class: 'notice ' + (kind || ''), role: kind === 'fault' ? 'alert' : null}, text,
-         Dom.button('Close', () => line.remove()));
+         button('Close', () => line.remove()));
   document.getElementById('notices').append(line);
   if (kind !== 'fault') setTimeout(() => line.remove(), 6000);
   return line;
@@ -136,7 +135,7 @@ export async function follow(title, job, told) {
   const bar = el('progress', {'aria-label': title, max: 1}), text = el('span', {class: 'job-text'});
   const line =
       el('p', {class: 'notice job'}, el('strong', {}, title), ' ', bar, ' ', text,
-         Dom.button('Stop', () => guarded(() => Ask.stop(job)), {'data-stop': job}));
+         button('Stop', () => guarded(() => Ask.stop(job)), {'data-stop': job}));
   document.getElementById('notices').append(line);
   try {
     return await Ask.follow(job, (event) => {
@@ -165,7 +164,7 @@ export function dialog(title, fill) {
     };
     box.setAttribute('aria-label', title);
     box.replaceChildren(
-        el('div', {class: 'dialog-head'}, el('h2', {tabindex: -1}, title), Dom.button('Close', () => close())),
+        el('div', {class: 'dialog-head'}, el('h2', {tabindex: -1}, title), button('Close', () => close())),
         fill(close));
     box.addEventListener('close', () => resolve(value), {once: true});
     box.showModal();
@@ -178,8 +177,8 @@ export const sure = async (title, content, yes, no) => Boolean(await dialog(
     title,
     (close) =>
         el('div', {}, content,
-           el('div', {class: 'toolbar'}, Dom.button(yes[0], () => close(true), yes[1]),
-              Dom.button(no[0], () => close(false), no[1])))));
+           el('div', {class: 'toolbar'}, button(yes[0], () => close(true), yes[1]),
+              button(no[0], () => close(false), no[1])))));
 
 // Lets the user choose a file or a folder of the opened folder. accepts(name) says which files may be chosen; with
 // `folders`, the folder that is shown may be chosen, too. Resolves to its relative path, or undefined.
@@ -190,15 +189,13 @@ export const choose = (title, {accepts = () => true, folders = false, at = ''} =
     const below = (name) => (here ? here + '/' : '') + name;
     place.replaceChildren(
         el('p', {class: 'note'}, here || '(the folder that is open)',
-           folders && Dom.button('Choose this folder', () => close(here), {'data-choose': here || '.'})),
-        el('ul', {class: 'files'}, here !== '' && el('li', {}, Dom.button('.. up', () => open(folderOf(here)))),
-           names.map(
-               (name) => el('li', {}, Dom.button(name + '/', () => open(below(name)), {'data-open': below(name)}))),
+           folders && button('Choose this folder', () => close(here), {'data-choose': here || '.'})),
+        el('ul', {class: 'files'}, here !== '' && el('li', {}, button('.. up', () => open(folderOf(here)))),
+           names.map((name) => el('li', {}, button(name + '/', () => open(below(name)), {'data-open': below(name)}))),
            files.filter((file) => accepts(file.name))
                .map(
                    (file) =>
-                       el('li', {},
-                          Dom.button(file.name, () => close(below(file.name)), {'data-choose': below(file.name)}),
+                       el('li', {}, button(file.name, () => close(below(file.name)), {'data-choose': below(file.name)}),
                           el('small', {}, ' ' + size(file.bytes))))));
   });
   open(at);
@@ -238,7 +235,7 @@ function save() {
 
 function showKeys() {
   const keys = [...((current && current.keys) || []), ...GENERAL_KEYS];
-  return dialog('Keys of this page', () => Dom.valueTable(keys.map(([key, does]) => [el('kbd', {}, key), does])));
+  return dialog('Keys of this page', () => valueTable(keys.map(([key, does]) => [el('kbd', {}, key), does])));
 }
 
 function pressed(event) {
@@ -275,7 +272,7 @@ function pressed(event) {
 
 export function start() {
   startTheme();
-  Dom.startTooltip();
+  startTooltip();
   document.getElementById('keys').addEventListener('click', showKeys);
   document.addEventListener('keydown', pressed);
   document.getElementById('pages').append(

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Mouse, touch and keys in a slice.
-import {pinched} from './pinch.js';
 import * as SliceGeometry from './slice_geometry.js';
+import {pinched} from './viewport.js';
 
 const placeOf = (view, event) => {
   const box = view.canvas.getBoundingClientRect();

@@ -2,6 +2,64 @@
 // The placement of an image on the screen. Places on the screen are [x, y] in CSS pixels from the top left corner of
 // the frame that shows the image; pixels are [u, v] with (0, 0) at the centre of the top left pixel.
 
+// Arranges pictures in a box so that they are as large as possible. If they would become too small, the box scrolls.
+const LEAST_px = 180, GAP_px = 8, CAPTION_px = 24;
+
+// The number of columns that shows `count` pictures largest. aspect: width by height of a picture.
+export function columnsFor(count, aspect, width, height) {
+  const heightOf = (columns) => {
+    const rows = Math.ceil(count / columns);
+    return Math.min(
+        (height - GAP_px * (rows - 1)) / rows - CAPTION_px, (width - GAP_px * (columns - 1)) / columns / aspect);
+  };
+  let best = 1;
+  for (let columns = 2; columns <= count; ++columns)
+    if (heightOf(columns) > heightOf(best)) best = columns;
+  if (heightOf(best) >= LEAST_px) return {columns: best, is_scrolled: false};
+  return {columns: Math.max(1, Math.min(count, Math.floor(width / LEAST_px))), is_scrolled: true};
+}
+
+// Keeps the children of a grid arranged. aspectOf() is asked for the pictures' shape. Returns {update, dispose}.
+export function arranged(grid, aspectOf) {
+  const update = () => {
+    const count = grid.children.length, {clientWidth: width, clientHeight: height} = grid;
+    if (!count || !width || !height) return;
+    const {columns, is_scrolled} = columnsFor(count, aspectOf(), width, height);
+    grid.style.gridTemplateColumns = `repeat(${columns}, minmax(0, 1fr))`;
+    grid.style.gridAutoRows =
+        is_scrolled ? Math.max(LEAST_px, width / columns / aspectOf() + CAPTION_px) + 'px' : 'minmax(0, 1fr)';
+  };
+  const observer = new ResizeObserver(update);
+  observer.observe(grid);
+  return {update, dispose: () => observer.disconnect()};
+}
+
+// What two fingers on a touch screen did when one of them moved to `place`. pointers: the places of both by their ids;
+// it gets the new place. Returns {factor: how much further apart they are, around: the middle before, by: the way of
+// the middle}.
+export function pinched(pointers, moved, place) {
+  const before = pointers.get(moved), other = [...pointers].find(([id]) => id !== moved)[1];
+  const apart = (at) => Math.hypot(at[0] - other[0], at[1] - other[1]);
+  const middle = (at) => at.map((value, i) => (value + other[i]) / 2);
+  pointers.set(moved, place);
+  return {
+    factor: apart(place) / Math.max(1, apart(before)),
+    around: middle(before),
+    by: place.map((value, i) => (value - before[i]) / 2)
+  };
+}
+
+// Shows a text beside the pointer. It is a child of the box in which `place` is given.
+export function hint(hint, text, [x, y]) {
+  hint.hidden = !text;
+  if (!text) return;
+  hint.textContent = text;
+  const {offsetWidth: width, offsetHeight: height, parentElement: box} = hint;
+  const left = x + 16 + width > box.clientWidth ? x - 12 - width : x + 16;
+  const top = y + 18 + height > box.clientHeight ? y - 10 - height : y + 18;
+  hint.style.transform = `translate(${Math.max(0, left)}px, ${Math.max(0, top)}px)`;
+}
+
 const LEAST_ZOOM = 0.02, MOST_ZOOM = 64;
 
 const whole = ([width_px, height_px], [width, height]) => Math.min(width / width_px, height / height_px);

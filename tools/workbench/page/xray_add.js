@@ -1,11 +1,118 @@
 // SPDX-License-Identifier: Apache-2.0
 // The dialogs that add a view to a case, or give another camera to one.
-import {button, el, form, labelled} from '../../report/page/dom.js';
+import {button, el, form, labelled, select} from '../../report/page/dom.js';
 
 import * as Ask from './server.js';
 import * as Shell from './shell.js';
-import {armFields} from './xray_arm.js';
-import * as XrayCameraFile from './xray_camera_file.js';
+
+const MIRRORS = [
+  ['none', 'not at all: it is seen from the source, with rows from the top'],
+  ['left_right', 'left to right: it is seen from the detector'],
+  ['upside_down', 'upside down: its rows begin at the bottom']
+];
+const is_rtk = (file) => /\.xml$/i.test(file);
+const holdsProjections = (file) => /\.(xml|h5|hdf5)$/i.test(file);
+
+// Resolves to the draft's camera, {file, projection, mirror, pixel_mm}, or to undefined.
+const askProjection = (file) => Shell.dialog('Camera file with projections', (close) => {
+  const projection =
+      el('input', {type: 'number', min: 0, step: 1, value: 0, required: true, 'data-camera-file': 'projection'});
+  const pixel =
+      el('input', {type: 'number', min: 0.000001, max: 1000, step: 'any', required: true, 'data-camera-file': 'pixel'});
+  const mirror = select(
+      'How the program’s image was turned over to become this one', MIRRORS, is_rtk(file) ? 'upside_down' : 'none',
+      () => {});
+  mirror.box.dataset.cameraFile = 'mirror';
+  const submit = () => {
+    const camera = {file, projection: Number(projection.value)};
+    if (mirror.box.value !== 'none') camera.mirror = mirror.box.value;
+    if (is_rtk(file)) camera.pixel_mm = [Number(pixel.value), Number(pixel.value)];
+    close(camera);
+  };
+  return form(
+      {class: 'arm-fields'}, submit, el('p', {class: 'note'}, file),
+      labelled('Number of the projection, counted from 0', projection), mirror,
+      is_rtk(file) && labelled('Size of a pixel on the detector, mm', pixel),
+      el('div', {class: 'toolbar'}, el('button', {type: 'submit', 'data-camera-file': 'ok'}, 'Use this camera')));
+});
+
+// The draft's camera for a chosen file. Asks for what the file does not say.
+const cameraOf = (file) => (holdsProjections(file) ? askProjection(file) : {file});
+
+export const cameraInWords = ({file, projection, mirror}) => file +
+    (projection === undefined ? '' : `, projection ${projection}`) +
+    (mirror ? `, image turned over ${mirror === 'left_right' ? 'left to right' : 'upside down'}` : '');
+
+// The angles and distances of a C-arm as fields. Nothing is filled in that nobody gave: a guessed number looks like a
+// measured one.
+
+// The keys of docs/case.md: [key, label, where it is found, what it may be at all, what it usually is, whether other
+// views have the same].
+const FIELDS = [
+  [
+    'alpha_deg', 'Cranio-caudal angle, degrees',
+    'Positive if the detector is towards the head. The display of the C-arm says CRAN for +, CAUD for −.', [-90, 90],
+    [-45, 45], false
+  ],
+  [
+    'beta_deg', 'Right/left anterior angle, degrees',
+    'Positive if the detector is on the patient’s left. The display says LAO for +, RAO for −.', [-180, 180],
+    [-120, 120], false
+  ],
+  [
+    'source_to_detector_mm', 'Source to detector, mm',
+    'SID on the display, or in the manual. In a DICOM header (0018,1110).', [1, 10000], [800, 1500], true
+  ],
+  [
+    'source_to_isocentre_mm', 'Source to isocentre, mm',
+    'In the manual: from the source to the point about which the arm turns. In a DICOM header (0018,1111).', [1, 10000],
+    [400, 1000], true
+  ],
+  [
+    'pixel_mm', 'Size of a pixel on the detector, mm',
+    'The width of the field on the detector, in mm, divided by the columns of the image. In a DICOM header ' +
+        '(0018,1164).',
+    [0.001, 100], [0.1, 0.6], true
+  ]
+];
+
+function fieldOf([key, label, where, [min, max], usual, stays], known, before) {
+  const given = known ? known[key] : stays && before ? before.c_arm[key] : undefined;
+  const note = el('small', {class: 'arm-note'}), id = 'arm-' + key;
+  const box = el('input', {
+    type: 'number',
+    step: 'any',
+    required: true,
+    min,
+    max,
+    value: given === undefined ? '' : given,
+    placeholder: `usually ${usual[0]} to ${usual[1]}`,
+    'data-arm': key,
+    'aria-describedby': id,
+    oninput: () => tell()
+  });
+  note.id = id;
+  const tell = () => {
+    const value = Number(box.value), is_odd = box.value !== '' && (value < usual[0] || value > usual[1]);
+    const source = !known && given !== undefined && Number(box.value) === given ? `As in ${before.name}. ` : '';
+    note.classList.toggle('odd', is_odd);
+    note.textContent =
+        is_odd ? `${box.value} is unusual; usual are ${usual[0]} to ${usual[1]}. ${where}` : source + where;
+  };
+  tell();
+  return {key, box, element: el('div', {class: 'arm-field'}, labelled(label, box), note)};
+}
+
+// known: the view's own values. before: {name, c_arm} of another view, whose distances this one has, too. values()
+// gives the numbers; first() is the first field without a number.
+function armFields(known, before) {
+  const fields = FIELDS.map((field) => fieldOf(field, known, before));
+  return {
+    element: el('div', {class: 'arm-fields'}, fields.map((one) => one.element)),
+    values: () => Object.fromEntries(fields.map(({key, box}) => [key, Number(box.value)])),
+    first: () => (fields.find(({box}) => box.value === '') || fields[0]).box
+  };
+}
 
 const is_image = (name) => /\.(png|tiff?|dcm|dicom)$/i.test(name);
 // "frontal.0001" of "a/frontal.0001.png".
@@ -51,7 +158,7 @@ async function cameraFor(answer, image) {
   if (answer.kind === 'file') {
     const file =
         await Shell.choose(`Camera of ${answer.name}`, {at: Shell.folderOf(image), accepts: (name) => !is_image(name)});
-    return file && XrayCameraFile.cameraOf(file);
+    return file && cameraOf(file);
   }
   if (answer.kind === 'header') {
     const {camera, warnings} = await Ask.json('api/xray/header-camera', {image});

@@ -1,9 +1,65 @@
 // SPDX-License-Identifier: Apache-2.0
 // Exports seeds, landmarks, starts and cameras to files of marrow and of other programs (docs/formats.md).
+import * as Dom from '../../report/page/dom.js';
 import {el, form, labelled, select} from '../../report/page/dom.js';
 
 import * as Ask from './server.js';
 import * as Shell from './shell.js';
+
+const IMPORTED = Object.freeze({seeds: 'Seeds', landmarks: 'Landmarks', pose: 'Start'});
+
+const fragmentOf = (document, name) => {
+  document.fragments = document.fragments || {};
+  return document.fragments[name] = document.fragments[name] || {seeds: [], register: true};
+};
+
+// Enters the content of a file into the document. Landmarks of the same name get the places in the file. Everything
+// else stays.
+const PUT = {
+  seeds(document, {seeds}) {
+    for (const [name, one] of Object.entries(seeds)) Object.assign(fragmentOf(document, name), one);
+  },
+  landmarks(document, {landmarks}) {
+    document.landmarks = document.landmarks || [];
+    for (const one of landmarks) {
+      const old = document.landmarks.find((other) => other.name === one.name);
+      if (old)
+        Object.assign(old, one, {pixels: {...(old.pixels || {}), ...(one.pixels || {})}});
+      else
+        document.landmarks.push(one);
+    }
+  },
+  pose(document, {world_from_ct}, fragment) {
+    fragmentOf(document, fragment).start = world_from_ct;
+  }
+};
+
+async function importFrom(shared, what) {
+  const path = await Shell.choose(`Import: ${IMPORTED[what].toLowerCase()}`);
+  if (path === undefined) return;
+  await Shell.guarded(async () => {
+    const got = await Ask.json('api/xray/import', {what, path});
+    await shared.draft.change(`import ${path}`, (document) => PUT[what](document, got, shared.fragment()));
+    for (const warning of got.warnings) Shell.notice(warning);
+    Shell.notice(`${IMPORTED[what]} read from ${path}`);
+  });
+}
+
+const NAMES = Object.freeze({...IMPORTED, cameras: 'Cameras', result: 'Result’s pose'});
+
+export function make(shared) {
+  const command = el('div', {role: 'status', 'data-exported': ''});
+  const told = ({path, command: text}) => command.replaceChildren(...(
+      text ? [el('p', {class: 'note'}, `The same as ${path} in a shell, into the folder runs:`), Dom.command(text)] :
+             []));
+  const button = (text, what, does) => Dom.button(
+      text, does, {[`data-${text.toLowerCase()}`]: what, 'aria-label': `${text} ${NAMES[what].toLowerCase()}`});
+  const row = (what) =>
+      el('span', {class: 'field'}, el('span', {}, NAMES[what]),
+         el('span', {class: 'pair'}, IMPORTED[what] && button('Import', what, () => importFrom(shared, what)),
+            button('Export', what, () => (what === 'result' ? beginResult(shared, told) : begin(shared, what, told)))));
+  return {element: el('div', {class: 'exchange'}, el('div', {class: 'toolbar'}, Object.keys(NAMES).map(row)), command)};
+}
 
 const POINTS = [
   ['.yaml', 'marrow (.yaml)'], ['.mrk.json', '3D Slicer (.mrk.json), one fragment'],
@@ -11,20 +67,9 @@ const POINTS = [
 ];
 const POSE = [['.yaml', 'marrow (.yaml)'], ['.tfm', 'ITK, 3D Slicer (.tfm)']];
 const CAMERAS = [['.h5', 'xReg (.h5)'], ['.xml', 'RTK (.xml)'], ['.txt', 'plastimatch (.txt), one view']];
-const FORMATS = {
-  seeds: POINTS,
-  landmarks: POINTS,
-  pose: POSE,
-  cameras: CAMERAS,
-  result: POSE.slice(1)
-};
-const TITLES = {
-  seeds: 'seeds',
-  landmarks: 'landmarks',
-  pose: 'start',
-  cameras: 'cameras',
-  result: 'a result’s pose'
-};
+const FORMATS = Object.freeze({seeds: POINTS, landmarks: POINTS, pose: POSE, cameras: CAMERAS, result: POSE.slice(1)});
+const TITLES = Object.freeze(
+    {seeds: 'seeds', landmarks: 'landmarks', pose: 'start', cameras: 'cameras', result: 'a result’s pose'});
 
 // The content to write, or a sentence that says why there is none.
 const GET = {
@@ -135,7 +180,7 @@ async function send(shared, what, content, answer, told) {
 }
 
 // told({path, command}) is called when the file is written.
-export async function begin(shared, what, told) {
+async function begin(shared, what, told) {
   const content = GET[what](shared.draft.document, shared.fragment(), shared);
   if (typeof content === 'string') return void Shell.notice(content, 'fault');
   const names = content.views ? content.views.map((view) => view.name) : Object.keys(content.fragments || {});
@@ -144,9 +189,9 @@ export async function begin(shared, what, told) {
 }
 
 // A pose that a run found, in one of its files.
-export async function beginResult(shared, told) {
-  const file =
-      await Shell.choose('Pose of a run, such as runs/NAME/outputs/pose/…', {accepts: (name) => /\.ya?ml$/.test(name)});
+async function beginResult(shared, told) {
+  const accepts = (name) => /\.ya?ml$/.test(name);
+  const file = await Shell.choose('Pose of a run, such as runs/NAME/outputs/pose/…', {accepts});
   if (file === undefined) return;
   const answer = await ask(shared, 'result', [], file.replace(/\.ya?ml$/, ''));
   if (answer) await send(shared, 'result', {file}, answer, told);

@@ -2,11 +2,8 @@
 // One X-ray on the screen: zooming, moving and windowing. The tool does everything else.
 import {el, svg} from '../../report/page/dom.js';
 
-import * as Hint from './cursor_hint.js';
-import {pinched} from './pinch.js';
 import * as Viewport from './viewport.js';
-import * as XrayImages from './xray_images.js';
-import * as XrayLook from './xray_look.js';
+import {pinched} from './viewport.js';
 import * as XrayPicture from './xray_picture.js';
 
 // tool() returns the present tool: {press(frame, pixel, event), arrow(frame, step), key(frame, name), marks(frame),
@@ -44,18 +41,18 @@ export function make(name, tool) {
   // arrived.
   frame.show = (entry) => {
     frame.wanted = entry;
-    if (frame.is_visible) XrayImages.hurry(entry);
+    if (frame.is_visible) XrayPicture.hurry(entry);
     if (frame.entry !== entry && entry.is_ready) {
       const same = (what) => JSON.stringify(entry[what]) === JSON.stringify((frame.entry || {})[what]);
       if (!same('width_px') || !same('height_px')) frame.port = null;
-      if (!same('ranges')) frame.window = entry.ranges && XrayLook.windowOf(entry.ranges);
+      if (!same('ranges')) frame.window = entry.ranges && XrayPicture.windowOf(entry.ranges);
       Object.assign(frame, {entry, picture: null});
     }
     frame.draw();
   };
   frame.relook = () => {
     if (!frame.entry || !frame.entry.numbers) return;
-    Object.assign(frame, {window: XrayLook.windowOf(frame.entry.ranges), picture: null});
+    Object.assign(frame, {window: XrayPicture.windowOf(frame.entry.ranges), picture: null});
     frame.draw();
   };
   frame.fit = () => {
@@ -96,7 +93,7 @@ export function make(name, tool) {
   const sight = new IntersectionObserver(([{isIntersecting}]) => {
     frame.is_visible = isIntersecting;
     if (!isIntersecting) return;
-    if (frame.wanted) XrayImages.hurry(frame.wanted);
+    if (frame.wanted) XrayPicture.hurry(frame.wanted);
     frame.draw();
   });
   sight.observe(box);
@@ -123,7 +120,7 @@ function draw(frame, canvas, tool) {
   frame.overlay.setAttribute('viewBox', `0 0 ${width} ${height}`);
   frame.overlay.replaceChildren();
   if (!entry || !entry.numbers || !frame.port) return;
-  frame.picture = frame.picture || XrayPicture.painted(entry, frame.window, XrayLook.curveOf(entry.ranges));
+  frame.picture = frame.picture || XrayPicture.painted(entry, frame.window, XrayPicture.greyCurve(entry.ranges));
   const pen = canvas.getContext('2d');
   pen.setTransform(...Viewport.canvasTransform(frame.port, canvas.width / width));
   pen.imageSmoothingEnabled = frame.port.zoom < 3;
@@ -138,7 +135,7 @@ function draw(frame, canvas, tool) {
 export const tenths = (value) => value.toFixed(1).replace(/^-0\.0$/, '0.0');
 
 function tell(frame, pixel) {
-  const grey = XrayImages.valueAt(frame.entry, pixel);
+  const grey = XrayPicture.valueAt(frame.entry, pixel);
   frame.value.textContent = grey === null ?
       '' :
       `(${tenths(pixel[0])}, ${tenths(pixel[1])}) px: ` + (frame.entry.scale === 1 ? grey : grey.toPrecision(5));
@@ -170,7 +167,7 @@ function listen(frame, tool) {
     if (pointers.size === 2 && pointers.has(event.pointerId)) return pinch(frame, pointers, event.pointerId, place);
     frame.pointer = pixel;
     tell(frame, pixel);
-    Hint.show(frame.hint, event.pointerType === 'mouse' && tool().says ? tool().says(frame, pixel) : '', place);
+    Viewport.hint(frame.hint, event.pointerType === 'mouse' && tool().says ? tool().says(frame, pixel) : '', place);
     if (doing && pointers.has(event.pointerId)) doing.move(pixel, place, last);
     last = place;
     frame.draw();
@@ -210,12 +207,7 @@ function pinch(frame, pointers, moved, place) {
   frame.change(Viewport.panned(Viewport.zoomed(frame.port, factor, around), by));
 }
 
-const ARROWS = {
-  ArrowLeft: [-1, 0],
-  ArrowRight: [1, 0],
-  ArrowUp: [0, -1],
-  ArrowDown: [0, 1]
-};
+const ARROWS = Object.freeze({ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1]});
 
 // Whether the key has a meaning here.
 function pressed(frame, tool, event) {

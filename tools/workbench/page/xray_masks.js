@@ -6,7 +6,7 @@ import * as Geometry from './geometry.js';
 import * as Ask from './server.js';
 import * as Shell from './shell.js';
 import * as Viewport from './viewport.js';
-import * as XrayImages from './xray_images.js';
+import * as XrayImages from './xray_picture.js';
 
 // A mask has `used`, a byte for each pixel, 0 or 255, and `picture`, a canvas that shows the unused pixels.
 function blank(width_px, height_px, used) {

@@ -4,15 +4,179 @@ import * as Dom from '../../report/page/dom.js';
 import {el} from '../../report/page/dom.js';
 
 import * as CasePage from './case.js';
+import {angle_deg, centralRay, length, meeting, minus, triangulated} from './geometry.js';
+import * as Ask from './server.js';
 import * as XrayAdd from './xray_add.js';
-import * as XrayCameraFile from './xray_camera_file.js';
-import * as XrayCheck from './xray_check.js';
-import * as XrayImages from './xray_images.js';
-import * as XrayTable from './xray_table.js';
+import * as XrayFrame from './xray_frame.js';
+import * as XrayTable from './xray_landmarks.js';
+import * as XrayImages from './xray_picture.js';
+
+// The size of a pixel that would make views agree. A wrong size is the usual mistake of a camera that was typed in: it
+// is often the one of the full detector, while the image was binned or zoomed.
+const LEAST_POINTS = 3, WRONG_mm = 1, BETTER = 0.4, LEAST_CHANGE = 0.03;
+
+// The camera if its pixels were `factor` times as large.
+const scaled = (camera, factor) => ({
+  ...camera,
+  intrinsics: camera.intrinsics.map((row, i) => (i < 2 ? [row[0] / factor, row[1] / factor, row[2]] : row))
+});
+
+// The landmarks that two views or more show, with the rays' ends: [{model_mm, seen: [{view, pixel}]}].
+const shared = (views, landmarks) =>
+    landmarks
+        .map(({model_mm, pixels}) => ({
+               model_mm,
+               seen: Object.entries(pixels || {}).filter(([name]) => views.some(({view}) => view.name === name))
+             }))
+        .filter(({seen}) => seen.length > 1);
+
+// How badly the views agree, in mm: the distances of the rays, and how far the distances between landmarks differ from
+// those in the CT.
+function disagreement(views, points, factorOf) {
+  const cameras = new Map(views.map(({view, camera}) => [view.name, scaled(camera, factorOf(view.name))]));
+  const found = points.map(
+      ({model_mm, seen}) =>
+          ({model_mm, at: triangulated(seen.map(([name, pixel]) => ({camera: cameras.get(name), pixel})))}));
+  if (found.some(({at}) => !at)) return Infinity;
+  const errors = found.map(({at}) => at.distance_mm), inCt = found.filter(({model_mm}) => model_mm);
+  for (let i = 0; i < inCt.length; ++i)
+    for (let k = 0; k < i; ++k)
+      errors.push(
+          length(minus(inCt[i].at.world_mm, inCt[k].at.world_mm)) - length(minus(inCt[i].model_mm, inCt[k].model_mm)));
+  return Math.sqrt(errors.reduce((sum, error) => sum + error * error, 0) / errors.length);
+}
+
+// The factor with the least disagreement, from a third to three times the present size.
+function best(cost) {
+  let low = Math.log(1 / 3), high = Math.log(3), at = 0, least = Infinity;
+  for (let round = 0; round < 5; ++round) {
+    const step = (high - low) / 24;
+    for (let i = 0; i <= 24; ++i) {
+      const value = cost(Math.exp(low + i * step));
+      if (value < least) [at, least] = [low + i * step, value];
+    }
+    [low, high] = [at - step, at + step];
+  }
+  return {factor: Math.exp(at), cost: least};
+}
+
+// A sentence if another size of the pixels, in one view or in all, explains the landmarks clearly better. Only views
+// that are given by the distances of a C-arm have a size that can be wrong.
+export function advice(views, landmarks) {
+  const points = shared(views, landmarks), arms = views.filter(({view}) => view.camera && view.camera.c_arm);
+  if (points.length < LEAST_POINTS || !arms.length) return '';
+  const now = disagreement(views, points, () => 1);
+  if (!(now > WRONG_mm)) return '';
+  const tried = [arms, ...(views.length > 1 ? arms.map((one) => [one]) : [])].map((changed) => {
+    const names = new Set(changed.map(({view}) => view.name));
+    return {changed, ...best((factor) => disagreement(views, points, (name) => (names.has(name) ? factor : 1)))};
+  });
+  const found = tried.reduce((a, b) => (b.cost < a.cost - 1e-9 ? b : a));
+  if (found.cost > BETTER * now || Math.abs(Math.log(found.factor)) < LEAST_CHANGE) return '';
+  const sizes = found.changed.map(({view}) => {
+    const {pixel_mm} = view.camera.c_arm;
+    return `${(pixel_mm * found.factor).toPrecision(3)} mm instead of ${pixel_mm} mm in ${view.name}`;
+  });
+  return `The landmarks disagree by ${now.toFixed(1)} mm. With pixels of ${sizes.join(' and ')} it would be ${
+      found.cost.toFixed(1)} mm. Is the image binned, zoomed or scaled?`;
+}
+
+const CHECK_PAUSE_ms = 500, MOST_LISTED = 4;
+
+const degrees = (value) => value.toFixed(1) + '°';
+const millimetres = (value) => Dom.number(value) + ' mm';
+
+// The angles of all pairs; of many views only the least and the largest.
+function anglesOf(views) {
+  const pairs = views.flatMap(
+      ({view, camera}, i) => views.slice(i + 1).map(
+          (other) => [`Between ${view.name} and ${other.view.name}`, angle_deg(camera, other.camera)]));
+  pairs.sort((a, b) => (views.length > MOST_LISTED ? a[1] - b[1] : 0));
+  return (views.length > MOST_LISTED ? [pairs[0], pairs.at(-1)] : pairs).map(([what, angle]) => [what, degrees(angle)]);
+}
+
+function distanceOf({view, camera}) {
+  const focal = camera.intrinsics[0][0], arm = view.camera && view.camera.c_arm;
+  const opening = 2 * Math.atan(camera.width_px / 2 / focal) * 180 / Math.PI;
+  return [
+    `${view.name}: source to detector`,
+    (arm ? millimetres(arm.source_to_detector_mm) : `${Dom.number(focal)} times the size of a pixel`) +
+        `; the image opens ${degrees(opening)}`
+  ];
+}
+
+// Numbers that reveal a mistake: [[what, figure]].
+function figuresOf(views) {
+  const rows = [...views.map(distanceOf), ...anglesOf(views)];
+  const met = views.length > 1 && meeting(views.map((one) => one.camera));
+  if (!met) return rows;
+  rows.push([
+    'Central rays meet at',
+    `(${met.world_mm.map(XrayFrame.tenths).join(', ')}) mm in the world; they pass each other at ` +
+        millimetres(met.distance_mm)
+  ]);
+  for (const {view, camera} of views)
+    rows.push(
+        [`${view.name}: source to that point`, millimetres(length(minus(centralRay(camera).origin, met.world_mm)))]);
+  return rows;
+}
+
+// Asks marrow to check the cameras when views and landmarks no longer change. Calls told({warnings, command}),
+// told({warnings, fault}), or told(null) if there is no view.
+function checking(draft, told) {
+  const ask =
+      Ask.whenStill('api/xray/check', CHECK_PAUSE_ms, (answer, fault) => told(fault ? {fault, warnings: []} : answer));
+  return (views) => {
+    const landmarks = (draft.document.landmarks || []).map(({name, pixels}) => {
+      const known = Object.entries(pixels || {}).filter(([view]) => views.some((one) => one.view.name === view));
+      return {name, pixels: Object.fromEntries(known)};
+    });
+    ask({views: views.map(({view: {name, image, camera}}) => ({name, image, camera})), landmarks}, views.length > 0);
+  };
+}
+
+function checkText(answer) {
+  if (!answer) return [];
+  const lines = answer.fault ? [el('p', {class: 'fault'}, answer.fault)] :
+                               answer.warnings.map((text) => el('p', {class: 'fault', 'data-warning': ''}, text));
+  const error = answer.metrics && answer.metrics.error;
+  if (!lines.length)
+    lines.push(
+        el('p', {class: 'note', 'data-good': ''},
+           error === undefined ?
+               'No fault was found in these cameras.' :
+               `No fault was found in these cameras; the marked landmarks are ${XrayTable.figure(error)} px off.`));
+  if (answer.command)
+    lines.push(el('details', {}, el('summary', {}, 'The same in a shell'), Dom.command(answer.command)));
+  return lines;
+}
+
+function makeCheck(draft) {
+  const figures = el('table', {class: 'values', 'data-figures': ''});
+  const size = el('p', {class: 'fault', role: 'status', 'data-pixel-size': ''});
+  const check = el('div', {role: 'status', 'data-check': ''});
+  const ask = checking(draft, (answer) => {
+    check.replaceChildren(...checkText(answer));
+    const count = answer ? answer.warnings.length + (answer.fault ? 1 : 0) : 0;
+    draft.check = answer && {lacks: count ? `${count} ${count === 1 ? 'doubt' : 'doubts'}` : ''};
+    draft.dispatchEvent(new Event('steps'));
+  });
+  let shown = '';
+  const update = (views, entries) => {
+    const known = views.map((view, i) => ({view, camera: entries[i].camera})).filter((one) => one.camera);
+    const now = JSON.stringify(known);
+    if (now !== shown)
+      figures.replaceChildren(el('tbody', {}, figuresOf(known).map(([what, figure]) => Dom.row(what, [figure]))));
+    shown = now;
+    size.textContent = advice(known, draft.document.landmarks || []);
+    if (entries.every((one) => one.is_ready)) ask(known);
+  };
+  return {element: el('div', {class: 'xray-check'}, figures, size, check), update};
+}
 
 function cameraText(view) {
   const camera = view.camera || {};
-  if (camera.file) return XrayCameraFile.inWords(camera);
+  if (camera.file) return XrayAdd.cameraInWords(camera);
   if (camera.c_arm)
     return `C-arm, ${camera.c_arm.alpha_deg}° cranio-caudal, ${camera.c_arm.beta_deg}° right/left anterior`;
   return camera.intrinsics ? 'matrices in the case' : 'no camera';
@@ -105,7 +269,7 @@ function rows(draft, list) {
 function make(draft) {
   const list = el('ul', {class: 'view-list'}), show = rows(draft, list);
   const sides = el('p', {class: 'note', 'data-sides': ''});
-  const check = XrayCheck.make(draft);
+  const check = makeCheck(draft);
   let is_waiting = false;
   const update = () => {
     const views = draft.document.views || [], entries = views.map((view) => XrayImages.of(view, soon));

@@ -5,15 +5,13 @@ import {el} from '../../report/page/dom.js';
 
 import * as CasePage from './case.js';
 import * as Ask from './server.js';
-import * as Tiles from './tiles.js';
+import * as Viewport from './viewport.js';
 import * as XrayAdd from './xray_add.js';
-import * as XrayExchange from './xray_exchange.js';
+import * as XrayExchange from './xray_export.js';
 import * as XrayFrame from './xray_frame.js';
-import * as XrayImages from './xray_images.js';
 import * as XrayLandmarks from './xray_landmarks.js';
-import * as XrayLook from './xray_look.js';
 import * as XrayMasks from './xray_masks.js';
-import * as XrayTable from './xray_table.js';
+import * as XrayImages from './xray_picture.js';
 
 const FIT_PAUSE_ms = 400;
 
@@ -86,7 +84,7 @@ function toolbar(shared, tools) {
   });
   const number = el('span', {class: 'note'}, size.value + ' px');
   const brush = Dom.labelled('Brush', el('span', {class: 'with-number'}, size, number));
-  const look = XrayLook.control(() => shared.frames.forEach((frame) => frame.relook()));
+  const look = XrayImages.control(() => shared.frames.forEach((frame) => frame.relook()));
   const all = Dom.button('Whole', () => shared.frames.forEach((frame) => frame.fit()), {'data-do': 'fit'});
   const update = () => {
     brush.hidden = !['brush', 'eraser'].includes(shared.tool);
@@ -123,7 +121,7 @@ function row(shared, tool) {
     const entry = [...shared.frames.values()].map((frame) => frame.entry).find((one) => one && one.numbers);
     return entry ? entry.width_px / entry.height_px : 1;
   };
-  const tiles = Tiles.arranged(place, aspect);
+  const tiles = Viewport.arranged(place, aspect);
   const update = () => {
     const views = shared.views(), names = views.map((one) => one.name);
     if ([...shared.frames.keys()].join('\n') !== names.join('\n')) {
@@ -176,7 +174,7 @@ function make(draft) {
     ...tools[shared.tool],
     marks: (frame) => [...XrayLandmarks.marks(shared, frame), ...masks.marks(frame)]
   });
-  const bar = toolbar(shared, tools), views = row(shared, tool), table = XrayTable.make(shared);
+  const bar = toolbar(shared, tools), views = row(shared, tool), table = XrayLandmarks.make(shared);
   const exchange = XrayExchange.make(shared);
   shared.refresh = () => {
     bar.element.hidden = !shared.views().length;

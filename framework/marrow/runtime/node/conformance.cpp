@@ -11,7 +11,7 @@
 
 #include "marrow/base/number_text.hpp"
 #include "marrow/base/process_state.hpp"
-#include "marrow/runtime/node/node_json.hpp"
+#include "marrow/runtime/node/relations.hpp"
 
 namespace marrow::conformance {
 namespace {

@@ -8,7 +8,6 @@
 #include <string_view>
 
 #include "marrow/base/error.hpp"
-#include "marrow/base/export.hpp"
 
 namespace MARROW_EXPORT marrow {
 

@@ -10,7 +10,7 @@
 
 #include "marrow/base/diagnostics.hpp"
 #include "marrow/plugin.hpp"
-#include "marrow/runtime/node/node_json.hpp"
+#include "marrow/runtime/node/relations.hpp"
 
 namespace marrow::detail {
 namespace {
@@ -201,7 +201,8 @@ void check_declaration(KindDefinition& kind) {
   std::vector<std::string>& faults = kind.faults;
   const KindInfo& info = kind.info;
   if (!is_name(info.name)) faults.push_back("a kind's name is lower_case, without a dot");
-  if (info.summary.empty()) faults.push_back("has no summary");
+  if (info.summary.empty() && !info.is_suite) faults.push_back("has no summary");
+  if (info.is_suite && info.checks.empty()) faults.push_back("its suite has no checks");
   check_texts("summary", {info.summary}, faults);
   check_ports(info.inputs, "input", faults);
   check_ports(info.outputs, "output", faults);

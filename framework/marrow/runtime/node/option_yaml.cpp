@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "marrow/runtime/node/option_yaml.hpp"
 
-#include <algorithm>
-
 #include "marrow/base/number_text.hpp"
 #include "marrow/base/printable.hpp"
 #include "marrow/base/yaml.hpp"

@@ -4,7 +4,6 @@
 #include <optional>
 #include <string>
 
-#include "marrow/base/export.hpp"
 #include "marrow/base/strict_yaml.hpp"
 #include "marrow/runtime/node/node.hpp"
 

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "marrow/runtime/node/relations.hpp"
 
-#include <algorithm>
-#include <vector>
+#include <nlohmann/json.hpp>
 
 #include "marrow/base/printable.hpp"
 
@@ -108,6 +107,10 @@ std::optional<BrokenRelation> broken(const RelationInfo& relation, const NodeInf
   if (given.size() == 1) return std::nullopt;
   const std::string got = given.empty() ? "none" : names.size() == 2 ? "both" : listed(given);
   return BrokenRelation{uses + " needs exactly one of " + listed(all) + ", got " + got, ""};
+}
+
+nlohmann::json json_of(const OptionValue& value) {
+  return std::visit([](const auto& v) { return nlohmann::json(v); }, value);
 }
 
 }  // namespace marrow

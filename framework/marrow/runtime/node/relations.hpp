@@ -4,6 +4,7 @@
 #include <optional>
 #include <string>
 
+#include <nlohmann/json_fwd.hpp>
 #include <vector>
 
 #include "marrow/runtime/node/node.hpp"
@@ -21,5 +22,12 @@ struct BrokenRelation {
 std::optional<BrokenRelation> broken(const RelationInfo& relation, const NodeInfo& info,
                                      const std::vector<OptionValue>& options,
                                      const std::function<bool(const std::string&)>& is_wired);
+
+/// An option's value as JSON.
+nlohmann::json json_of(const OptionValue& value);
+
+/// The names of the types of relations, in the order of RelationType.
+inline constexpr const char* kRelationTypes[] = {"not_above",   "below",        "same_length", "as_many_or_none",
+                                                 "exactly_one", "at_least_one", "distinct"};
 
 }  // namespace marrow

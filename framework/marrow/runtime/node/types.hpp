@@ -1,12 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 // The value types that all plugins share. A plugin registers the types of its own namespace itself.
-#include "marrow/base/export.hpp"
 #include "marrow/domain/calibration.hpp"
 #include "marrow/domain/case.hpp"
 #include "marrow/domain/features.hpp"
 #include "marrow/domain/functions.hpp"
-#include "marrow/domain/landmarks.hpp"
 #include "marrow/domain/scene.hpp"
 #include "marrow/domain/verdict.hpp"
 #include "marrow/runtime/node/value.hpp"

@@ -4,7 +4,6 @@
 #include <string>
 #include <vector>
 
-#include "marrow/base/export.hpp"
 #include "marrow/base/hash.hpp"
 #include "marrow/domain/archived.hpp"
 

@@ -3,7 +3,6 @@
 
 #include <nlohmann/json.hpp>
 
-#include "marrow/base/printable.hpp"
 #include "marrow/base/yaml.hpp"
 
 namespace marrow {

@@ -1,11 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "marrow/runtime/pipeline/input_texts.hpp"
+#include "marrow/runtime/pipeline/pipeline_resolved.hpp"
 
 #include <cctype>
 
 #include "marrow/base/number_text.hpp"
-#include "marrow/base/printable.hpp"
-#include "marrow/runtime/pipeline/environment_variable.hpp"
+#include "marrow/runtime/pipeline/given_value.hpp"
 #include "marrow/runtime/pipeline/pipeline_names.hpp"
 
 namespace marrow {

@@ -1,10 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "marrow/runtime/pipeline/may_fail.hpp"
 
-#include <algorithm>
 #include <set>
 
-#include "marrow/base/error.hpp"
 #include "marrow/base/printable.hpp"
 #include "marrow/runtime/node/relations.hpp"
 #include "marrow/runtime/pipeline/pipeline_names.hpp"

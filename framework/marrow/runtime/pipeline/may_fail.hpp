@@ -4,8 +4,6 @@
 #include <string>
 #include <vector>
 
-#include "marrow/base/diagnostics.hpp"
-#include "marrow/runtime/node/value.hpp"
 #include "marrow/runtime/pipeline/pipeline.hpp"
 
 namespace marrow {

@@ -1,7 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "marrow/runtime/pipeline/one_node.hpp"
-
-#include "marrow/base/printable.hpp"
 #include "marrow/runtime/pipeline/given_value.hpp"
 #include "marrow/runtime/pipeline/pipeline_names.hpp"
 #include "marrow/runtime/pipeline/pipeline_resolved.hpp"

@@ -2,18 +2,13 @@
 // Makes a checked graph from a written pipeline: looks up names, converts options, checks wires, finds axes.
 #include "marrow/runtime/pipeline/pipeline.hpp"
 
-#include <algorithm>
-#include <map>
-#include <optional>
 #include <set>
 
 #include "marrow/base/file_names.hpp"
 #include "marrow/base/printable.hpp"
 #include "marrow/runtime/node/types.hpp"
-#include "marrow/runtime/pipeline/pipeline_layer.hpp"
 #include "marrow/runtime/pipeline/pipeline_names.hpp"
 #include "marrow/runtime/pipeline/pipeline_resolved.hpp"
-#include "marrow/runtime/plugins/contract.hpp"
 
 namespace marrow {
 namespace {

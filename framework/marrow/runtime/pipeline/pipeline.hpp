@@ -9,7 +9,6 @@
 #include <vector>
 
 #include "marrow/base/diagnostics.hpp"
-#include "marrow/base/export.hpp"
 #include "marrow/runtime/plugins/catalogue.hpp"
 
 namespace MARROW_EXPORT marrow {
@@ -173,5 +172,49 @@ std::string no_writer(const TypeInfo& type);
 /// Adds a fault for each output of the pipeline whose type no library can write. A pipeline that only the program runs
 /// may have any outputs.
 void check_writers(const Pipeline& pipeline, const Catalogue& catalogue, Diagnostics& diagnostics);
+
+/// Adds what a file of settings says, with the keys `inputs` and `set`, to the arguments of a pipeline. Its overrides
+/// are a layer above those that are there.
+void add_settings(const std::filesystem::path& file, PipelineArguments& arguments, Diagnostics& diagnostics);
+
+/// A node that may replace another node of a pipeline.
+struct Fit {
+  std::string node;                  ///< kind.name
+  std::vector<std::string> missing;  ///< what must be wired or given so that the node fits, one line each
+  std::vector<std::string> faults;   ///< why it does not fit
+};
+
+/// The nodes that could replace node `id`, with the default values of their options: all nodes of the same kind, even
+/// if they do not fit, and then the nodes of other kinds that fit. If the pipeline itself has faults or `id` is
+/// unknown, this goes to `diagnostics`, and the result is empty.
+std::vector<Fit> nodes_in_place_of(const std::string& id, const std::filesystem::path& file,
+                                   const PipelineArguments& arguments, const Catalogue& catalogue,
+                                   Diagnostics& diagnostics);
+
+// Which poses of a pipeline get a verdict. A pose without one must not look like a judged pose.
+
+/// Keeps only the outputs of these names, and the verdicts on all poses that are made for them. So a part of a pipeline
+/// tells as much about its poses as the whole. Throws Error if the pipeline has no output of a name.
+void keep_outputs(Pipeline& pipeline, const std::vector<std::string>& names);
+
+/// A sentence for each output that is a pose without a verdict. A verdict on an earlier pose also counts, if the output
+/// was made from that pose and no node in between has a cost. So new deviations keep the verdict; a new search does
+/// not.
+std::vector<std::string> notes_on_poses(const Pipeline& pipeline);
+
+/// A pipeline of one node, and the values of its inputs. run_pipeline() runs it with `given` as RunSettings::given.
+struct OneNode {
+  Pipeline pipeline;  ///< its last node is called; its outputs have the names of the node's outputs
+  std::map<std::string, std::vector<Value>> given;
+};
+
+/// Makes a pipeline that calls the node `name`, for a program that has the node's inputs in memory. Each of `inputs`
+/// has the name of a port. If a port takes one item and gets a list, the node is called for each item, as in any
+/// pipeline. Each of `options` has a name and its value as in given_value(). Relative paths start at the working
+/// folder. All faults go to `diagnostics`. The result may be used only if there are none. The place of a fault has no
+/// line: Place::file is "kind.name(port or option)".
+OneNode pipeline_of_node(const std::string& name, const std::vector<std::pair<std::string, Value>>& inputs,
+                         const std::vector<std::pair<std::string, std::string>>& options, const Catalogue& catalogue,
+                         Diagnostics& diagnostics);
 
 }  // namespace marrow

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // The inputs that a pipeline declares, and their values.
-#include "marrow/runtime/pipeline/pipeline_layer.hpp"
+#include "marrow/runtime/pipeline/pipeline_text.hpp"
 
 #include <algorithm>
 
-#include "marrow/base/plain_path.hpp"
+#include "marrow/base/file_names.hpp"
 #include "marrow/base/printable.hpp"
 #include "marrow/runtime/node/option_yaml.hpp"
 #include "marrow/runtime/pipeline/pipeline_names.hpp"

@@ -6,8 +6,6 @@
 #include <vector>
 
 #include "marrow/base/diagnostics.hpp"
-#include "marrow/base/export.hpp"
-#include "marrow/base/names.hpp"
 
 namespace MARROW_EXPORT marrow {
 

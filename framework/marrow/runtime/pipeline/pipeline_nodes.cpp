@@ -4,8 +4,8 @@
 
 #include "marrow/base/number_text.hpp"
 #include "marrow/base/printable.hpp"
-#include "marrow/runtime/pipeline/pipeline_layer.hpp"
 #include "marrow/runtime/pipeline/pipeline_names.hpp"
+#include "marrow/runtime/pipeline/pipeline_text.hpp"
 
 namespace marrow {
 namespace {

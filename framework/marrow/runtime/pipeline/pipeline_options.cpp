@@ -4,8 +4,8 @@
 
 #include <algorithm>
 
+#include "marrow/base/file_names.hpp"
 #include "marrow/base/number_text.hpp"
-#include "marrow/base/plain_path.hpp"
 #include "marrow/base/printable.hpp"
 #include "marrow/runtime/node/option_yaml.hpp"
 #include "marrow/runtime/node/relations.hpp"

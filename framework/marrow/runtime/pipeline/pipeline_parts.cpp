@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 // Parts: nodes that are pipelines. A run does not know them, because the nodes of their files take their place.
-#include "marrow/runtime/pipeline/pipeline_layer.hpp"
 
 #include <algorithm>
 #include <functional>
@@ -8,8 +7,7 @@
 
 #include "marrow/base/number_text.hpp"
 #include "marrow/base/printable.hpp"
-#include "marrow/runtime/pipeline/extended_file.hpp"
-#include "marrow/runtime/pipeline/input_texts.hpp"
+#include "marrow/runtime/pipeline/named_files.hpp"
 #include "marrow/runtime/pipeline/pipeline_names.hpp"
 #include "marrow/runtime/pipeline/pipeline_resolved.hpp"
 

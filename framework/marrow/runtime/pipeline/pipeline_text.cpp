@@ -2,13 +2,10 @@
 // A pipeline file with the files that it extends: the lowest first, and each puts its own over it.
 #include "marrow/runtime/pipeline/pipeline_text.hpp"
 
-#include <set>
-
 #include "marrow/base/file_names.hpp"
 #include "marrow/base/number_text.hpp"
 #include "marrow/base/printable.hpp"
-#include "marrow/runtime/pipeline/extended_file.hpp"
-#include "marrow/runtime/pipeline/pipeline_layer.hpp"
+#include "marrow/runtime/pipeline/named_files.hpp"
 #include "marrow/runtime/pipeline/pipeline_names.hpp"
 
 namespace marrow {

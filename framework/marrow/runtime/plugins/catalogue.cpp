@@ -1,18 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "marrow/runtime/plugins/catalogue.hpp"
 
-#include <algorithm>
 #include <cstdlib>
 #include <nlohmann/json.hpp>
 #include <set>
 #include <sstream>
 
+#include "marrow/base/diagnostics.hpp"
 #include "marrow/base/framework_file.hpp"
-#include "marrow/base/names.hpp"
 #include "marrow/base/regular_file.hpp"
 #include "marrow/base/text_file.hpp"
-#include "marrow/plugin.hpp"
-#include "marrow/runtime/plugins/contract.hpp"
 #include "marrow/runtime/plugins/library_index.hpp"
 #include "marrow/runtime/plugins/python_file.hpp"
 
@@ -71,15 +68,24 @@ void Catalogue::find_libraries() {
 
 void Catalogue::enter_names() {
   kinds_.clear();
+  suites_.clear();
+  with_suite_.clear();
   nodes_.clear();
   writers_.clear();
   for (std::size_t l = 0; l < libraries_.size(); ++l) {
     const LibraryInfo& library = libraries_[l];
-    for (std::size_t i = 0; i < library.kinds.size(); ++i) kinds_.try_emplace(library.kinds[i].name, Entry{l, i});
+    for (std::size_t i = 0; i < library.kinds.size(); ++i)
+      (library.kinds[i].is_suite ? suites_ : kinds_).try_emplace(library.kinds[i].name, Entry{l, i});
     for (std::size_t i = 0; i < library.nodes.size(); ++i) nodes_.try_emplace(library.nodes[i].name, Entry{l, i});
     for (std::size_t i = 0; i < library.writers.size(); ++i)
       writers_.try_emplace(library.writers[i].type.id, Entry{l, i});
   }
+  for (const auto& [name, entry] : suites_)
+    if (const KindInfo* kind = find_kind(name); kind && kind->checks.empty()) {
+      KindInfo whole = *kind;
+      whole.checks = libraries_[entry.library].kinds[entry.index].checks;
+      with_suite_.emplace(name, std::move(whole));
+    }
 }
 
 void Catalogue::enter_not_built() {
@@ -165,6 +171,7 @@ std::vector<std::string> Catalogue::kind_names() const {
 }
 
 const KindInfo* Catalogue::find_kind(const std::string& name) const {
+  if (const auto whole = with_suite_.find(name); whole != with_suite_.end()) return &whole->second;
   const auto found = kinds_.find(name);
   return found == kinds_.end() ? nullptr : &libraries_[found->second.library].kinds[found->second.index];
 }
@@ -221,14 +228,71 @@ const NodeDefinition& Catalogue::load(const std::string& name) const {
   return load_plugin(entry.library).nodes.at(entry.index);
 }
 
-const KindDefinition& Catalogue::load_kind(const std::string& name) const {
-  const Entry& entry = kinds_.at(name);
-  return load_plugin(entry.library).kinds.at(entry.index);
+const conformance::Suite& Catalogue::load_suite(const std::string& kind) const {
+  const Entry& entry = (with_suite_.contains(kind) ? suites_ : kinds_).at(kind);
+  return load_plugin(entry.library).kinds.at(entry.index).suite;
 }
 
 const WriterDefinition& Catalogue::load_writer(const TypeInfo& type) const {
   const Entry& entry = writers_.at(type.id);
   return load_plugin(entry.library).writers.at(entry.index);
+}
+
+namespace {
+
+template <class Port>
+const Port* find_port(const std::vector<Port>& ports, const std::string& name) {
+  const auto found = std::find_if(ports.begin(), ports.end(), [&](const Port& port) { return port.name == name; });
+  return found == ports.end() ? nullptr : &*found;
+}
+
+/// Checks that each port whose name the kind knows has the type and the axis of the contract.
+void check_ports(const std::vector<PortInfo>& ports, const std::vector<KindPort>& contract, const std::string& what,
+                 const std::string& kind, std::vector<std::string>& faults) {
+  for (const PortInfo& port : ports) {
+    const KindPort* known = find_port(contract, port.name);
+    if (!known) continue;
+    const bool is_one = std::find(known->types.begin(), known->types.end(), port.type) != known->types.end();
+    if (is_one && known->axis == port.axis) continue;
+    const bool is_old = !is_one && std::any_of(known->types.begin(), known->types.end(),
+                                               [&](const TypeInfo& type) { return type.id == port.type.id; });
+    faults.push_back(what + " '" + port.name + "': the kind '" + kind + "' has it as " +
+                     types_text(known->types, known->axis) + ", not " +
+                     (is_old ? "another version of that type; build both again" : types_text({port.type}, port.axis)));
+  }
+}
+
+void check_traits(const NodeInfo& node, const KindInfo& kind, std::vector<std::string>& faults) {
+  std::vector<std::string> known;
+  for (const TraitInfo& trait : kind.traits) known.push_back(trait.name);
+  for (const std::string& trait : node.traits)
+    if (std::find(known.begin(), known.end(), trait) == known.end())
+      faults.push_back("trait '" + trait + "': the kind '" + kind.name + "' has none of that name" +
+                       (known.empty() ? "" : "; " + suggestion(trait, known)));
+}
+
+}  // namespace
+
+std::string types_text(const std::vector<TypeInfo>& types, const std::string& axis) {
+  std::string text;
+  for (const TypeInfo& type : types) text += (text.empty() ? "" : " or ") + type.id;
+  return axis.empty() ? text : "list of " + text + " over " + axis;
+}
+
+std::vector<std::string> contract_faults(const NodeInfo& node, const KindInfo* kind) {
+  std::vector<std::string> faults;
+  if (!kind || !kind->sees_truth)
+    for (const PortInfo& port : node.inputs)
+      if (port.type.id == TypeInfo::of<Truth>().id)
+        faults.push_back("input '" + port.name + "': only nodes of a kind that may see the truth are given it");
+  if (!kind) return faults;
+  check_ports(node.inputs, kind->inputs, "input", kind->name, faults);
+  check_ports(node.outputs, kind->outputs, "output", kind->name, faults);
+  for (const KindPort& port : kind->outputs)
+    if (!find_port(node.outputs, port.name))
+      faults.push_back("output '" + port.name + "' is missing: every node of the kind '" + kind->name + "' has it");
+  check_traits(node, *kind, faults);
+  return faults;
 }
 
 }  // namespace marrow

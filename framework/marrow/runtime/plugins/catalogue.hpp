@@ -7,12 +7,13 @@
 #include <string>
 #include <vector>
 
-#include "marrow/base/export.hpp"
 #include "marrow/runtime/plugins/library.hpp"
 
 namespace MARROW_EXPORT marrow {
 
-struct KindDefinition;
+namespace conformance {
+struct Suite;
+}
 
 /// All kinds and nodes that can be used. They are known from manifests; a library is loaded when its code is first
 /// needed. A constructed catalogue is safe to use from several threads.
@@ -56,8 +57,8 @@ class Catalogue {
 
   /// Loads the node's library. Throws Error if that fails.
   const NodeDefinition& load(const std::string& name) const;
-  /// Loads the library that declares the kind. Throws Error if that fails.
-  const KindDefinition& load_kind(const std::string& name) const;
+  /// Loads the library that has the kind's suite. Throws Error if that fails.
+  const conformance::Suite& load_suite(const std::string& kind) const;
   const WriterDefinition& load_writer(const TypeInfo& type) const;
 
  private:
@@ -75,10 +76,20 @@ class Catalogue {
   };
   std::map<std::string, Entry> nodes_;
   std::map<std::string, Entry> kinds_;
+  std::map<std::string, Entry> suites_;         // of kinds that other libraries declare
+  std::map<std::string, KindInfo> with_suite_;  // these kinds, with the checks of their suites
   std::map<std::string, Entry> writers_;
   std::map<std::string, std::string> not_built_;
   mutable std::mutex mutex_;
   mutable std::map<std::size_t, std::unique_ptr<Plugin>> loaded_;
 };
+
+/// What breaks the contract of the node's kind, one sentence each. `kind` is null if no library declares the kind: its
+/// nodes may then have any ports, but are not given the truth. A kind without outputs leaves the outputs to its nodes.
+/// A node may have inputs and outputs that its kind does not have.
+std::vector<std::string> contract_faults(const NodeInfo& node, const KindInfo* kind);
+
+/// Types as a text: "view", "list of view over view", "outline_projector or radiograph_projector".
+std::string types_text(const std::vector<TypeInfo>& types, const std::string& axis);
 
 }  // namespace marrow

@@ -6,10 +6,10 @@
 
 #include <sys/stat.h>
 
+#include <unistd.h>
+#include <cerrno>
 #include <csignal>
-#include <cstring>
 
-#include "marrow/base/error.hpp"
 #include "marrow/base/json_text.hpp"
 #include "marrow/base/number_text.hpp"
 #include "marrow/base/regular_file.hpp"
@@ -17,9 +17,7 @@
 #include "marrow/runtime/plugins/library_index.hpp"
 #include "marrow/runtime/plugins/linked_libraries.hpp"
 #include "marrow/runtime/plugins/manifest.hpp"
-#include "marrow/runtime/plugins/own_cache.hpp"
 #include "marrow/runtime/plugins/python_file.hpp"
-#include "marrow/runtime/plugins/trust.hpp"
 
 namespace marrow {
 namespace {
@@ -95,6 +93,32 @@ bool is_manifest(const fs::path& file) {
   }
 }
 
+/// Whether a folder belongs to the user alone. A folder that an older version made readable for all is made private.
+bool is_own(const fs::path& folder) {
+  struct stat status {};
+  if (stat(folder.c_str(), &status) != 0 || !S_ISDIR(status.st_mode) || status.st_uid != geteuid()) return false;
+  if ((status.st_mode & 077) && chmod(folder.c_str(), 0700) != 0) return false;
+  return changeable_by_others(folder).empty();
+}
+
+/// Makes the folder for the user alone. Nobody else may be able to change the folders above it.
+bool make_own(const fs::path& folder) {
+  std::error_code error;
+  if (fs::exists(folder, error)) return is_own(folder);
+  const fs::path parent = folder.parent_path();
+  if (!fs::exists(parent, error) && !make_own(parent)) return false;
+  if (!changeable_by_others(parent).empty()) return false;
+  return (mkdir(folder.c_str(), 0700) == 0 || errno == EEXIST) && is_own(folder);
+}
+
+/// Empty if there is no such folder that belongs to the user alone. `make`: makes it.
+fs::path own_cache_folder(bool make) {
+  const fs::path cache = user_cache_folder();
+  if (cache.empty()) return {};
+  const fs::path folder = cache / "marrow" / "libraries";
+  return (make ? make_own(folder) : is_own(folder)) ? folder : fs::path();
+}
+
 }  // namespace
 
 fs::path manifest_beside(const fs::path& library) { return fs::path(library).replace_extension(".json"); }
@@ -164,6 +188,27 @@ void write_manifest(const LibraryInfo& info) {
     throw Error(manifest.string() + " exists and is not a manifest that marrow wrote; move it away, or rename " +
                 info.file.string());
   write_text_file(manifest, manifest_text(info), Kinds::files, 0644);
+}
+
+std::optional<std::string> own_cached_text(const std::string& name, std::size_t most_bytes) try {
+  const fs::path folder = own_cache_folder(false);
+  if (folder.empty()) return std::nullopt;
+  const RegularFile file(folder / name);
+  if (file.status().st_uid != geteuid()) return std::nullopt;
+  return read_text(file, most_bytes);
+} catch (const Error&) {
+  return std::nullopt;
+}
+
+void keep_in_own_cache(const std::string& name, const std::string& text) try {
+  if (const fs::path folder = own_cache_folder(true); !folder.empty())
+    write_text_file(folder / name, text, Kinds::files, 0600);
+} catch (const Error&) {
+}
+
+void forget_in_own_cache(const std::string& name) {
+  std::error_code error;
+  if (const fs::path folder = own_cache_folder(false); !folder.empty()) fs::remove(folder / name, error);
 }
 
 }  // namespace marrow

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 #include <optional>
+#include <string>
 
-#include "marrow/base/export.hpp"
 #include "marrow/runtime/plugins/library.hpp"
 #include "marrow/runtime/process/worker.hpp"
 
@@ -32,5 +32,17 @@ std::string why_not_described(const WorkerEnd& end, const std::string& used);
 
 /// What a person can do about a wrong description.
 std::string cure_of_description(const std::filesystem::path& library);
+
+// The folder that keeps descriptions of libraries: marrow/libraries in the user's cache folder. If others could change
+// it or the folders above it, nothing is kept and nothing is found.
+
+/// The text of a file in this folder. Nothing if it is missing, is longer than `most_bytes` or belongs to someone else.
+std::optional<std::string> own_cached_text(const std::string& name, std::size_t most_bytes);
+
+/// Writes a file in this folder, for the user alone. If it cannot be written, nothing is kept: it is only a cache.
+void keep_in_own_cache(const std::string& name, const std::string& text);
+
+/// Removes a file in this folder.
+void forget_in_own_cache(const std::string& name);
 
 }  // namespace marrow

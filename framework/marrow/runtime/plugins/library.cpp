@@ -7,22 +7,18 @@
 #include <unistd.h>
 
 #include <chrono>
-#include <cstring>
 #include <set>
 #include <tuple>
 
-#include "marrow/base/elf_file.hpp"
 #include "marrow/base/framework_file.hpp"
 #include "marrow/base/number_text.hpp"
 #include "marrow/base/process_state.hpp"
 #include "marrow/base/regular_file.hpp"
-#include "marrow/plugin.hpp"
 #include "marrow/runtime/plugins/descriptions.hpp"
 #include "marrow/runtime/plugins/linked_libraries.hpp"
 #include "marrow/runtime/plugins/manifest.hpp"
 #include "marrow/runtime/plugins/python_file.hpp"
 #include "marrow/runtime/plugins/trust.hpp"
-#include "marrow/runtime/process/worker.hpp"
 
 namespace marrow {
 namespace {

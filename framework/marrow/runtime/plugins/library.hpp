@@ -5,9 +5,6 @@
 #include <string>
 #include <vector>
 
-#include "marrow/base/export.hpp"
-#include "marrow/base/hash.hpp"
-#include "marrow/runtime/node/kind.hpp"
 #include "marrow/runtime/node/node.hpp"
 
 namespace MARROW_EXPORT marrow {

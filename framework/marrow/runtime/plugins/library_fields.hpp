@@ -5,8 +5,7 @@
 #include <array>
 #include <type_traits>
 
-#include "marrow/base/archive.hpp"
-#include "marrow/runtime/node/node_json.hpp"
+#include "marrow/runtime/node/relations.hpp"
 #include "marrow/runtime/plugins/library.hpp"
 
 namespace marrow {
@@ -82,9 +81,10 @@ const char* visit_fields(T& of, const Function& field) {
     field("name", name), field("what", what), field("limit", limit), field("unit", unit);
     return "a check";
   } else if constexpr (std::is_same_v<Type, KindInfo>) {
-    auto& [name, summary, inputs, outputs, sees_truth, apart, traits, checks] = of;
+    auto& [name, summary, inputs, outputs, sees_truth, apart, traits, checks, is_suite] = of;
     field("name", name), field("summary", summary), field("inputs", inputs), field("outputs", outputs),
-        field("sees_truth", sees_truth), field("apart", apart), field("traits", traits), field("checks", checks);
+        field("sees_truth", sees_truth), field("apart", apart), field("traits", traits), field("checks", checks),
+        field("is_suite", is_suite);
     return "a kind";
   } else if constexpr (std::is_same_v<Type, WriterInfo>) {
     auto& [type, extension, help] = of;

@@ -3,16 +3,14 @@
 
 #include <unistd.h>
 
-#include <algorithm>
 #include <cstdlib>
 #include <ctime>
 
-#include "marrow/base/file_state.hpp"
 #include "marrow/base/framework_file.hpp"
+#include "marrow/base/regular_file.hpp"
 #include "marrow/runtime/plugins/descriptions.hpp"
 #include "marrow/runtime/plugins/library_fields.hpp"
 #include "marrow/runtime/plugins/linked_libraries.hpp"
-#include "marrow/runtime/plugins/own_cache.hpp"
 #include "marrow/runtime/plugins/python_file.hpp"
 
 namespace marrow {

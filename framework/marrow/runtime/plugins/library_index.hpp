@@ -4,7 +4,6 @@
 #include <optional>
 #include <span>
 
-#include "marrow/base/export.hpp"
 #include "marrow/runtime/plugins/library.hpp"
 #include "marrow/runtime/plugins/trust.hpp"
 

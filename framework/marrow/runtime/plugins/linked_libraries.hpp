@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 // The libraries that a plugin needs. They can change its results as much as its own code can.
-#include "marrow/base/export.hpp"
 #include "marrow/runtime/plugins/library.hpp"
 
 namespace MARROW_EXPORT marrow {

@@ -3,12 +3,24 @@
 #include <dlfcn.h>
 #include <link.h>
 
+#include <fcntl.h>
+#include <spawn.h>
+#include <sys/auxv.h>
+#include <sys/wait.h>
+#include <unistd.h>
 #include <algorithm>
+#include <array>
+#include <cerrno>
 #include <cstdint>
 #include <map>
+#include <mutex>
 #include <set>
+#include <sstream>
+#include <string>
 
+#include "marrow/base/descriptor.hpp"
 #include "marrow/base/framework_file.hpp"
+#include "marrow/base/regular_file.hpp"
 #include "marrow/runtime/plugins/linked_libraries.hpp"
 
 namespace marrow {
@@ -94,6 +106,71 @@ const link_map* map_of_framework() {
   return map;
 }
 
+/// The program that loads libraries; it is a part of each process.
+std::string loader_of_system() {
+  Dl_info info{};
+  const auto begin = reinterpret_cast<const void*>(getauxval(AT_BASE));
+  return begin && dladdr(begin, &info) && info.dli_fname ? info.dli_fname : "";
+}
+
+/// What a program prints; empty if it cannot be started.
+std::string output_of(const std::vector<std::string>& command) {
+  Pipe pipe = open_pipe();
+  if (!pipe.read_end.is_open()) return "";
+  posix_spawn_file_actions_t actions;
+  posix_spawn_file_actions_init(&actions);
+  posix_spawn_file_actions_adddup2(&actions, pipe.write_end, STDOUT_FILENO);
+  posix_spawn_file_actions_addopen(&actions, STDERR_FILENO, "/dev/null", O_WRONLY, 0);
+  std::vector<char*> arguments;
+  for (const std::string& text : command) arguments.push_back(const_cast<char*>(text.c_str()));
+  arguments.push_back(nullptr);
+  pid_t process = -1;
+  const int fault = posix_spawn(&process, arguments[0], &actions, nullptr, arguments.data(), environ);
+  posix_spawn_file_actions_destroy(&actions);
+  pipe.write_end.close();
+  std::string output;
+  std::array<char, 4096> buffer;
+  for (ssize_t count = 0;
+       !fault && (count = read(pipe.read_end, buffer.data(), buffer.size())) != 0 && (count > 0 || errno == EINTR);)
+    if (count > 0) output.append(buffer.data(), std::size_t(count));
+  while (!fault && waitpid(process, nullptr, 0) < 0 && errno == EINTR) continue;
+  return output;
+}
+
+Digest identity_of_package(const std::string& path, const FileState& state) try {
+  Hasher hasher;
+  const std::string note = build_note(RegularFile(path));
+  hasher.add(note);
+  hasher.add(std::int64_t(state.size));
+  if (note.empty()) hasher.add(std::int64_t(state.written.tv_sec)), hasher.add(std::int64_t(state.written.tv_nsec));
+  return hasher.digest();
+} catch (const Error& error) {
+  throw Error(path + " " + error.what());
+}
+
+std::string variable(const char* name) {
+  const char* text = std::getenv(name);
+  return text ? text : "";
+}
+
+std::string without_version(const std::string& name) { return name.substr(0, name.find(".so") + 3); }
+
+std::vector<fs::path> folders_of(const std::string& search_path) {
+  std::vector<fs::path> folders;
+  std::istringstream stream(search_path);
+  for (std::string folder; std::getline(stream, folder, ':');) folders.emplace_back(folder.empty() ? "." : folder);
+  return folders;
+}
+
+std::vector<fs::path> libraries_in(const fs::path& folder) {
+  std::vector<fs::path> files;
+  std::error_code error;
+  for (fs::directory_iterator at(folder, error), end; !error && at != end; at.increment(error))
+    if (at->path().filename().string().find(".so") != std::string::npos) files.push_back(at->path());
+  std::sort(files.begin(), files.end());
+  return files;
+}
+
 }  // namespace
 
 const std::vector<LinkedLibrary>& framework_libraries() {
@@ -121,6 +198,86 @@ std::vector<LinkedLibrary> linked_libraries(void* handle) {
   wanted.erase(framework);
   wanted.erase(self);
   return files_of_loaded(wanted, loaded);
+}
+
+std::vector<fs::path> libraries_to_load(const fs::path& library) {
+  std::vector<fs::path> found;
+  const std::string loader = loader_of_system();
+  if (loader.empty()) return found;
+  std::istringstream lines(output_of({loader, "--list", fs::absolute(library).string()}));
+  for (std::string line; std::getline(lines, line);) {  // "\tNAME => PATH (0xADDRESS)", or only "\tPATH (0xADDRESS)"
+    const std::size_t arrow = line.find(" => "), begin = arrow == std::string::npos ? 1 : arrow + 4,
+                      end = line.rfind(" (0x");
+    if (end != std::string::npos && begin < end && line[begin] == '/') found.push_back(line.substr(begin, end - begin));
+  }
+  return found;
+}
+
+std::vector<fs::path> paths_of(const std::vector<LinkedLibrary>& libraries) {
+  std::vector<fs::path> paths;
+  for (const LinkedLibrary& library : libraries) paths.emplace_back(library.path);
+  return paths;
+}
+
+bool is_of_the_system(const std::string& file) {
+  return (file.starts_with("/usr/") && !file.starts_with("/usr/local/")) || file.starts_with("/lib");
+}
+
+Digest identity_of(const LinkedLibrary& library) {
+  const std::optional<FileState> state = state_of(library.path);
+  if (!state) throw Error(library.path + " cannot be read: " + std::strerror(errno));
+  struct Known {
+    FileState state;
+    Digest identity;
+  };
+  static std::mutex mutex;
+  static std::map<std::string, Known> known;
+  const std::scoped_lock lock(mutex);
+  const auto found = known.find(library.path);
+  if (found != known.end() && found->second.state == *state) return found->second.identity;
+  const Digest identity =
+      is_of_the_system(library.path) ? identity_of_package(library.path, *state) : file_digest(library.path);
+  known[library.path] = {*state, identity};
+  return identity;
+}
+
+const std::vector<Digest>& framework_identities() {
+  static const std::vector<Digest> identities = [] {
+    std::vector<Digest> found;
+    for (const LinkedLibrary& library : framework_libraries()) found.push_back(identity_of(library));
+    return found;
+  }();
+  return identities;
+}
+
+std::string found_before(const LinkedLibrary& library) {
+  struct Found {
+    std::string search_path;
+    std::multimap<std::string, fs::path> files;
+  };
+  static std::mutex mutex;
+  static Found found;
+  const std::string search_path = variable("LD_LIBRARY_PATH");
+  const std::scoped_lock lock(mutex);
+  if (found.search_path != search_path) {
+    found = {search_path, {}};
+    for (const fs::path& folder : folders_of(search_path))
+      for (const fs::path& file : libraries_in(folder)) found.files.emplace(without_version(file.filename()), file);
+  }
+  const auto [begin, end] = found.files.equal_range(without_version(fs::path(library.path).filename()));
+  for (auto at = begin; at != end; ++at) {
+    std::error_code error;
+    if (fs::canonical(at->second, error) != library.path && !error) return at->second.string();
+  }
+  return "";
+}
+
+Digest search_digest() {
+  Hasher hasher;
+  for (const char* name : {"LD_LIBRARY_PATH", "LD_PRELOAD"}) hasher.add(variable(name));
+  for (const fs::path& folder : folders_of(variable("LD_LIBRARY_PATH")))
+    for (const fs::path& file : libraries_in(folder)) hasher.add(file.string());
+  return hasher.digest();
 }
 
 }  // namespace marrow

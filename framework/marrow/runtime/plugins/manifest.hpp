@@ -2,8 +2,7 @@
 #pragma once
 #include <nlohmann/json.hpp>
 
-#include "marrow/base/export.hpp"
-#include "marrow/runtime/node/node_json.hpp"
+#include "marrow/runtime/node/relations.hpp"
 #include "marrow/runtime/plugins/library.hpp"
 
 namespace MARROW_EXPORT_TO_TESTS marrow {

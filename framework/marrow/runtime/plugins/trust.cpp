@@ -15,12 +15,8 @@
 #include <cstdlib>
 #include <cstring>
 #include <optional>
-#include <vector>
 
-#include "marrow/base/error.hpp"
 #include "marrow/base/number_text.hpp"
-#include "marrow/base/user_folder.hpp"
-#include "marrow/runtime/plugins/library.hpp"
 #include "marrow/runtime/plugins/linked_libraries.hpp"
 
 namespace marrow {

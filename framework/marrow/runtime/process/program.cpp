@@ -15,12 +15,10 @@
 #include "marrow/base/descriptor.hpp"
 #include "marrow/base/error.hpp"
 #include "marrow/base/names.hpp"
-#include "marrow/base/no_process.hpp"
 #include "marrow/base/number_text.hpp"
 #include "marrow/base/printable.hpp"
 #include "marrow/base/process_tree.hpp"
 #include "marrow/base/stopwatch.hpp"
-#include "spawn.hpp"
 
 namespace marrow {
 namespace {

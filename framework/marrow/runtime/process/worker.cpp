@@ -14,16 +14,13 @@
 #include <cstdio>
 #include <cstring>
 #include <fstream>
-#include <utility>
 
 #include "marrow/base/error.hpp"
 #include "marrow/base/framework_file.hpp"
 #include "marrow/base/json_text.hpp"
-#include "marrow/base/no_process.hpp"
 #include "marrow/base/number_text.hpp"
 #include "marrow/base/process_tree.hpp"
 #include "marrow/base/stopwatch.hpp"
-#include "spawn.hpp"
 
 namespace marrow {
 namespace {

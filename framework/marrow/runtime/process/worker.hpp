@@ -22,7 +22,6 @@
 #include <vector>
 
 #include "marrow/base/descriptor.hpp"
-#include "marrow/base/export.hpp"
 
 namespace MARROW_EXPORT marrow {
 

@@ -11,12 +11,10 @@
 #include <new>
 #include <opencv2/core.hpp>
 
-#include "marrow/base/descriptor.hpp"
 #include "marrow/base/error.hpp"
 #include "marrow/base/json_text.hpp"
 #include "marrow/base/number_text.hpp"
 #include "marrow/base/process_tree.hpp"
-#include "marrow/base/reason_of_exception.hpp"
 #include "marrow/runtime/process/worker.hpp"
 
 namespace marrow {

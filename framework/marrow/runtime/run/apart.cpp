@@ -3,22 +3,14 @@
 
 #include <signal.h>
 
-#include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <condition_variable>
-#include <cstring>
-#include <memory>
-#include <mutex>
 #include <thread>
 
-#include "marrow/base/error.hpp"
-#include "marrow/base/no_process.hpp"
 #include "marrow/base/number_text.hpp"
 #include "marrow/runtime/node/abi.hpp"
 #include "marrow/runtime/pipeline/named_files.hpp"
 #include "marrow/runtime/plugins/manifest.hpp"
-#include "marrow/runtime/process/packed_values.hpp"
 #include "marrow/runtime/process/worker.hpp"
 #include "marrow/runtime/run/run_log.hpp"
 

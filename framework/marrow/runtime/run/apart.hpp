@@ -3,9 +3,6 @@
 // Calls of nodes in their own process. This is for nodes that parse files which come from outside.
 #include <nlohmann/json_fwd.hpp>
 
-#include "marrow/base/export.hpp"
-#include "marrow/runtime/node/context.hpp"
-#include "marrow/runtime/plugins/catalogue.hpp"
 #include "marrow/runtime/process/packed_values.hpp"
 #include "marrow/runtime/run/executor.hpp"
 

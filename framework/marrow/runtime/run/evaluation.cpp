@@ -2,18 +2,10 @@
 // Finds the result of each call, once for each recipe within a run. Reads it from the store if it is there.
 #include "marrow/runtime/run/evaluation.hpp"
 
-#include <algorithm>
-#include <optional>
-#include <set>
-#include <tuple>
-
 #include "marrow/base/printable.hpp"
-#include "marrow/runtime/node/mapping.hpp"
-#include "marrow/runtime/run/keys.hpp"
-#include "marrow/runtime/run/program_versions.hpp"
+#include "marrow/runtime/run/node_calls.hpp"
 #include "marrow/runtime/run/replay.hpp"
 #include "marrow/runtime/store/digest_memory.hpp"
-#include "marrow/runtime/store/shared_claim.hpp"
 #include "marrow/runtime/store/shared_folder.hpp"
 #include "marrow/runtime/store/shared_store.hpp"
 

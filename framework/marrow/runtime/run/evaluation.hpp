@@ -9,10 +9,9 @@
 #include <string>
 #include <vector>
 
-#include "marrow/base/export.hpp"
 #include "marrow/base/process_state.hpp"
 #include "marrow/runtime/run/executor.hpp"
-#include "marrow/runtime/run/files_read.hpp"
+#include "marrow/runtime/run/keys.hpp"
 
 namespace marrow {
 

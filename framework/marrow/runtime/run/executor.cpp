@@ -5,13 +5,10 @@
 #include <oneapi/tbb/global_control.h>
 #include <oneapi/tbb/task_arena.h>
 
-#include <algorithm>
-#include <opencv2/core.hpp>
 #include <thread>
 
-#include "marrow/base/no_process.hpp"
-#include "marrow/base/process_state.hpp"
-#include "marrow/base/thread_supply.hpp"
+#include "marrow/base/machine.hpp"
+#include "marrow/base/number_text.hpp"
 #include "marrow/runtime/run/graph_run.hpp"
 
 namespace marrow {
@@ -40,6 +37,37 @@ RunResult run_pipeline(const Pipeline& pipeline, const Catalogue& catalogue, con
   RunResult result = run.finish();
   arena.terminate();
   return result;
+}
+
+using Status = NodeRecord::Status;
+
+const char* status_name(Status status) {
+  static constexpr const char* kNames[] = {"not needed", "done",      "skipped",     "failed",
+                                           "not run",    "cancelled", "failed alone"};
+  return kNames[int(status)];
+}
+
+bool NodeRecord::was_stopped() const { return status == Status::not_run && calls + cached == 0; }
+
+std::string not_run_text(int nodes) {
+  return formatted("{} not run because of it", counted(nodes, "node was", "nodes were"));
+}
+
+bool RunResult::failed() const {
+  return std::any_of(nodes.begin(), nodes.end(), [](const NodeRecord& node) { return node.status == Status::failed; });
+}
+
+bool RunResult::cancelled() const {
+  return std::any_of(nodes.begin(), nodes.end(),
+                     [](const NodeRecord& node) { return node.status == Status::cancelled; });
+}
+
+Value value_of(const RunResult& result, const Reference& source) {
+  const NodeRecord& node = result.nodes[std::size_t(source.node)];
+  if (node.outputs.empty()) return {};
+  Value value = node.outputs[std::size_t(source.output)];
+  for (const std::string& item : source.items) value = picked(value, item, source.text);
+  return value;
 }
 
 }  // namespace marrow

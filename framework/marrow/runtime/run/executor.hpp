@@ -10,9 +10,6 @@
 #include <string_view>
 #include <vector>
 
-#include "marrow/base/export.hpp"
-#include "marrow/runtime/pipeline/pipeline.hpp"
-#include "marrow/runtime/plugins/catalogue.hpp"
 #include "marrow/runtime/run/profile.hpp"
 #include "marrow/runtime/store/store.hpp"
 

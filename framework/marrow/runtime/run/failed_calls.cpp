@@ -1,18 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "marrow/runtime/run/failed_calls.hpp"
 
-#include <algorithm>
 #include <nlohmann/json.hpp>
 #include <sstream>
 
-#include "marrow/base/error.hpp"
 #include "marrow/base/file_names.hpp"
 #include "marrow/base/json_text.hpp"
 #include "marrow/base/number_text.hpp"
 #include "marrow/base/printable.hpp"
 #include "marrow/base/text_file.hpp"
 #include "marrow/runtime/run/apart.hpp"
-#include "marrow/runtime/run/written_values.hpp"
+#include "marrow/runtime/run/place_of_results.hpp"
 
 namespace marrow {
 namespace {
@@ -23,7 +21,7 @@ using nlohmann::json;
 constexpr const char *kCallFile = "call.json", *kKeysFile = "results.json";
 
 /// "track/edges" -> track/edges. What a file name cannot have is escaped.
-fs::path folders_of(const std::string& names) {
+fs::path path_of_folders(const std::string& names) {
   fs::path path;
   std::istringstream parts(names);
   for (std::string part; std::getline(parts, part, '/');) path /= file_name_of(part);
@@ -40,15 +38,9 @@ fs::path new_folder(const fs::path& base) {
   return folder;
 }
 
-class Counter : public Archive {
- public:
-  void bytes(const void*, std::size_t size) override { count += size; }
-  std::size_t count = 0;
-};
-
 bool is_small(const Value& value) {
   if (!value.data || !value.type.content) return false;
-  Counter counter;
+  ByteCounter counter;
   value.type.content->pack(value.data.get(), counter);
   return counter.count <= FailedCalls::kMostBytesOfInput;
 }
@@ -129,8 +121,8 @@ void FailedCalls::keep(const FailedCall& call) {
 }
 
 void FailedCalls::write(const FailedCall& call) {
-  const fs::path base = run_folder_ / "failed" / folders_of(call.path);
-  const fs::path folder = new_folder(call.place.empty() ? base : base / folders_of(call.place));
+  const fs::path base = run_folder_ / "failed" / path_of_folders(call.path);
+  const fs::path folder = new_folder(call.place.empty() ? base : base / path_of_folders(call.place));
   json inputs = call.inputs.empty() && !call.node.info.inputs.empty() ? json() : json::object();
   for (std::size_t i = 0; i < call.inputs.size(); ++i) {
     const std::string& port = call.node.info.inputs[i].name;

@@ -8,7 +8,6 @@
 #include <string>
 #include <vector>
 
-#include "marrow/base/export.hpp"
 #include "marrow/runtime/run/replay.hpp"
 
 namespace MARROW_EXPORT marrow {

@@ -2,14 +2,10 @@
 // Runs a graph: starts each node when its sources have ended, on one pool of threads. Also plans what a run would do.
 #include "marrow/runtime/run/graph_run.hpp"
 
-#include <algorithm>
-#include <chrono>
-
-#include "marrow/base/no_process.hpp"
 #include "marrow/base/process_tree.hpp"
 #include "marrow/runtime/run/passes.hpp"
 #include "marrow/runtime/run/replay.hpp"
-#include "marrow/runtime/store/known_keys.hpp"
+#include "marrow/runtime/store/digest_memory.hpp"
 
 namespace marrow {
 
@@ -71,14 +67,7 @@ void GraphRun::begin(tbb::task_arena& arena, std::function<void()> on_end) {
   } catch (...) {
     set_fault();
   }
-  std::function<void()> end;
-  {
-    const std::scoped_lock lock(mutex_);
-    --at_work_;
-    if (is_over()) end = std::exchange(on_end_, nullptr);
-    if (at_work_ == 0) all_done_.notify_all();
-  }
-  if (end) end();
+  end_work();
 }
 
 const RunResult& GraphRun::result() const {
@@ -189,14 +178,7 @@ void GraphRun::enqueue(std::function<void()> work, bool always) {
       } catch (...) {
         set_fault();
       }
-      std::function<void()> end;
-      {
-        const std::scoped_lock lock(mutex_);
-        --at_work_;
-        if (is_over()) end = std::exchange(on_end_, nullptr);
-        if (at_work_ == 0) all_done_.notify_all();
-      }
-      if (end) end();  // from here on another thread may destroy this run
+      end_work();
     });
   } catch (const std::bad_alloc&) {  // there is no memory: the work will not run
     withdraw(*is_taken);
@@ -207,6 +189,18 @@ void GraphRun::enqueue(std::function<void()> work, bool always) {
     throw NoProcess(std::string("cannot start a thread (") + error.what() +
                     "); the limit of processes is reached (ulimit -u)");
   }
+}
+
+/// Counts one piece of work as done. If it was the last one, another thread may destroy this run from here on.
+void GraphRun::end_work() {
+  std::function<void()> end;
+  {
+    const std::scoped_lock lock(mutex_);
+    --at_work_;
+    if (is_over()) end = std::exchange(on_end_, nullptr);
+    if (at_work_ == 0) all_done_.notify_all();
+  }
+  if (end) end();
 }
 
 void GraphRun::withdraw(std::atomic<bool>& is_taken) {

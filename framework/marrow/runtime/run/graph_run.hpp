@@ -10,8 +10,6 @@
 #include <mutex>
 #include <vector>
 
-#include "marrow/base/stopwatch.hpp"
-#include "marrow/runtime/run/evaluation.hpp"
 #include "marrow/runtime/run/node_calls.hpp"
 
 namespace marrow {
@@ -55,6 +53,7 @@ class GraphRun {
   int count_sources(std::size_t index) const;
   void enqueue(std::function<void()> work, bool always = false);
   void withdraw(std::atomic<bool>& is_taken);
+  void end_work();
   void set_fault();
   bool is_over() const { return (unfinished_ == 0 || is_broken_) && at_work_ == 0; }
   void sample_memory();

@@ -5,20 +5,14 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include <filesystem>
-#include <map>
-#include <mutex>
-#include <optional>
-
-#include "marrow/base/descriptor.hpp"
-#include "marrow/base/file_state.hpp"
 #include "marrow/base/machine.hpp"
 #include "marrow/base/number_text.hpp"
-#include "marrow/base/regular_file.hpp"
-#include "marrow/runtime/node/mapping.hpp"
+#include "marrow/base/printable.hpp"
+#include "marrow/base/temporary_folder.hpp"
 #include "marrow/runtime/pipeline/named_files.hpp"
 #include "marrow/runtime/pipeline/pipeline_names.hpp"
-#include "marrow/runtime/run/program_versions.hpp"
+#include "marrow/runtime/process/program.hpp"
+#include "marrow/runtime/run/node_calls.hpp"
 #include "marrow/runtime/store/digest_memory.hpp"
 
 namespace marrow {
@@ -57,6 +51,20 @@ Digest digest_once(const fs::path& file) {
     known[file] = {*state, digest};
   }
   return digest;
+}
+
+constexpr double kVersionLimit_s = 120;  // a program in Python may load large libraries first
+
+std::string asked(const std::vector<std::string>& command) {
+  const TemporaryFolder folder(new_temporary_folder("version"));
+  const ProgramCall call{command, folder.path(), kVersionLimit_s, 0, {}};
+  const ProgramEnd end = run_program(call);
+  if (const std::string fault = failure_of_program(call, end); !fault.empty()) throw Error("version_command: " + fault);
+  const std::size_t last = end.printed.find_last_not_of(" \t\r\n");
+  if (last == end.printed.npos)
+    throw Error("version_command: the program " + in_quotes(command[0]) +
+                " printed nothing; name a command that prints the program's version");
+  return end.printed.substr(0, last + 1);
 }
 
 }  // namespace
@@ -217,6 +225,85 @@ std::uint64_t seed_of(const Digest& recipe, std::uint64_t run_seed) {
   hasher.add(recipe);
   hasher.add(run_seed);
   return hasher.digest().low;
+}
+
+namespace fs = std::filesystem;
+
+void FilesRead::note(const Contents& contents) {
+  const std::scoped_lock lock(mutex_);
+  for (const auto& [path, content] : contents) {
+    std::error_code error;
+    const fs::path real = fs::weakly_canonical(fs::absolute(path, error), error);
+    for (const auto& [file, digest] : content.files) note(file, digest, path);
+    // A file may have been added to a folder, or removed from it.
+    if (!content.is_there)
+      note(real, Digest{}, path);
+    else if (fs::is_directory(real, error))
+      note(real, content.digest, path);
+    contents_.try_emplace(path, content);
+  }
+}
+
+Contents FilesRead::of(const PipelineNode& node) const {
+  const std::scoped_lock lock(mutex_);
+  Contents result;
+  for (const std::string& path : paths_of(node))
+    if (const auto found = contents_.find(path); found != contents_.end()) result.insert(*found);
+  return result;
+}
+
+void FilesRead::note(const fs::path& real, const Digest& content, const std::string& said) {
+  const auto [known, is_new] = known_.try_emplace(real, content);
+  if (is_new || known->second == content) return;
+  throw Error(said +
+              " was changed while the run went on: another node read something else there; run it again when nothing "
+              "writes to it");
+}
+
+std::map<std::string, Digest> contents_of_options(const PipelineNode& node, const Contents& contents) {
+  std::map<std::string, Digest> result;
+  for (std::size_t i = 0; i < node.options.size(); ++i) {
+    std::vector<std::string> paths = paths_of(node, i);
+    std::erase(paths, "");
+    if (paths.empty()) continue;
+    Hasher hasher;
+    bool all_there = true;
+    for (const std::string& path : paths) {
+      const auto found = contents.find(path);
+      all_there = all_there && found != contents.end() && found->second.is_there;
+      if (all_there) hasher.add(found->second.digest);
+    }
+    result[node.info.options[i].name] = all_there ? hasher.digest() : Digest{};
+  }
+  return result;
+}
+
+bool asks_for_version(const OptionInfo& option) {
+  return option.name == "version_command" && option.type == OptionType::texts;
+}
+
+std::string version_printed(const std::vector<std::string>& command) {
+  struct Known {
+    std::optional<FileState> state;
+    std::string printed;
+  };
+  static std::mutex mutex;
+  static std::map<std::vector<std::string>, Known> known;
+  if (command.empty()) return "";
+  const std::optional<FileState> state = state_of(program_file(command[0]));
+  const std::scoped_lock lock(mutex);
+  Known& one = known[command];
+  if (one.printed.empty() || !(one.state == state)) one = {state, asked(command)};
+  return one.printed;
+}
+
+std::string version_of_program(const PipelineNode& node) {
+  for (std::size_t i = 0; i < node.options.size(); ++i) try {
+      if (asks_for_version(node.info.options[i]))
+        return version_printed(std::get<std::vector<std::string>>(node.options[i]));
+    } catch (const Error&) {  // its calls have failed, and said why
+    }
+  return "";
 }
 
 }  // namespace marrow

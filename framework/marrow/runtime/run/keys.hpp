@@ -3,9 +3,10 @@
 #include <cstdint>
 #include <filesystem>
 #include <map>
+#include <mutex>
+#include <string>
 #include <vector>
 
-#include "marrow/base/export.hpp"
 #include "marrow/runtime/pipeline/pipeline.hpp"
 #include "marrow/runtime/store/store.hpp"
 
@@ -64,5 +65,37 @@ std::string warning_now(std::string warning, const PipelineNode& node, const Pro
 
 /// The seed of a call's random numbers.
 std::uint64_t seed_of(const Digest& recipe, std::uint64_t run_seed);
+
+/// The contents that the nodes of a run found in their files. All nodes must find the same content: if a file is edited
+/// between two nodes, the results would mix both contents. Safe to use from several threads.
+class FilesRead {
+ public:
+  /// Adds contents. Throws Error if another content was found before.
+  void note(const Contents& contents);
+  /// The noted contents of the node's paths.
+  Contents of(const PipelineNode& node) const;
+
+ private:
+  void note(const std::filesystem::path& real, const Digest& content, const std::string& said);
+
+  mutable std::mutex mutex_;
+  std::map<std::filesystem::path, Digest> known_;
+  Contents contents_;
+};
+
+/// The content of each option of type path that names something. It is zero if any of the option's paths is missing on
+/// disk or in `contents`.
+std::map<std::string, Digest> contents_of_options(const PipelineNode& node, const Contents& contents);
+
+/// Whether the option is a command that asks a program for its version: a list of texts with the name version_command.
+/// What the command prints counts in the keys of the node's results.
+bool asks_for_version(const OptionInfo& option);
+
+/// What the command prints, without blanks at its end. It runs once in this process, and again if the file of the
+/// program changes. Empty if the command is empty. Throws Error if it fails or prints nothing.
+MARROW_EXPORT_TO_TESTS std::string version_printed(const std::vector<std::string>& command);
+
+/// What the node's program says about its version; empty if it has none, or if the program does not answer.
+std::string version_of_program(const PipelineNode& node);
 
 }  // namespace marrow

@@ -1,14 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "marrow/runtime/run/output_faults.hpp"
 
-#include <algorithm>
-
-#include "marrow/base/error.hpp"
 #include "marrow/base/number_text.hpp"
-#include "marrow/domain/camera.hpp"
-#include "marrow/domain/mesh.hpp"
-#include "marrow/domain/pose.hpp"
-#include "marrow/domain/volume.hpp"
 #include "marrow/runtime/node/types.hpp"
 
 namespace marrow {

@@ -2,7 +2,6 @@
 #pragma once
 #include <string>
 
-#include "marrow/base/export.hpp"
 #include "marrow/runtime/node/value.hpp"
 
 namespace MARROW_EXPORT marrow {

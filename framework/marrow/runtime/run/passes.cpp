@@ -3,13 +3,9 @@
 // the first pass.
 #include "marrow/runtime/run/passes.hpp"
 
-#include <algorithm>
-
 #include "marrow/base/number_text.hpp"
-#include "marrow/runtime/node/mapping.hpp"
 #include "marrow/runtime/node/types.hpp"
 #include "marrow/runtime/pipeline/pipeline_names.hpp"
-#include "marrow/runtime/run/pass_records.hpp"
 #include "marrow/runtime/run/replay.hpp"
 
 namespace marrow {

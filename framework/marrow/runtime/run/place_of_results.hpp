@@ -5,8 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "marrow/base/export.hpp"
-#include "marrow/runtime/pipeline/pipeline.hpp"
+#include "marrow/runtime/run/run_folder.hpp"
 
 namespace MARROW_EXPORT marrow {
 
@@ -18,5 +17,10 @@ void expect_nothing_reads(const Pipeline& pipeline, const std::filesystem::path&
 /// The first of the folders that contains `place`, with all links followed; nothing if none does.
 std::optional<std::filesystem::path> folder_that_holds(const std::vector<std::filesystem::path>& folders,
                                                        const std::filesystem::path& place);
+
+/// Writes a value to `stem` and the extension of its writer, or the items of a list into the folder `stem`. `written`
+/// receives the files, relative to `root`, or why there are none.
+void write_value(const Value& value, const std::filesystem::path& stem, const std::filesystem::path& root,
+                 const Catalogue& catalogue, RunFolder::Written& written);
 
 }  // namespace marrow

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "marrow/runtime/run/profiled_functions.hpp"
+#include "marrow/runtime/run/profile.hpp"
 
 #include <cxxabi.h>
 

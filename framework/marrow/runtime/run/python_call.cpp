@@ -9,10 +9,8 @@
 #include <cstring>
 
 #include "marrow/base/number_text.hpp"
-#include "marrow/runtime/node/types.hpp"
 #include "marrow/runtime/plugins/python_file.hpp"
 #include "marrow/runtime/plugins/python_functions.hpp"
-#include "marrow/runtime/plugins/python_process.hpp"
 #include "marrow/runtime/plugins/trust.hpp"
 #include "marrow/runtime/run/apart.hpp"
 #include "marrow/runtime/run/run_log.hpp"

@@ -6,16 +6,10 @@
 #include <unistd.h>
 
 #include <cerrno>
-#include <chrono>
-#include <cstring>
 #include <ctime>
 #include <fstream>
-#include <limits>
-#include <set>
 #include <thread>
 
-#include "marrow/base/descriptor.hpp"
-#include "marrow/base/error.hpp"
 #include "marrow/base/file_names.hpp"
 #include "marrow/base/framework_file.hpp"
 #include "marrow/base/machine.hpp"
@@ -24,15 +18,12 @@
 #include "marrow/base/printable.hpp"
 #include "marrow/base/regular_file.hpp"
 #include "marrow/base/text_file.hpp"
-#include "marrow/runtime/node/mapping.hpp"
-#include "marrow/runtime/pipeline/pipeline.hpp"
-#include "marrow/runtime/pipeline/written_content.hpp"
+#include "marrow/runtime/pipeline/named_files.hpp"
 #include "marrow/runtime/plugins/manifest.hpp"
 #include "marrow/runtime/run/failed_calls.hpp"
-#include "marrow/runtime/run/keys.hpp"
-#include "marrow/runtime/run/program_versions.hpp"
-#include "marrow/runtime/run/verdict_json.hpp"
-#include "marrow/runtime/run/written_values.hpp"
+#include "marrow/runtime/run/node_calls.hpp"
+#include "marrow/runtime/run/place_of_results.hpp"
+#include "marrow/runtime/run/verdicts.hpp"
 
 namespace marrow {
 namespace {

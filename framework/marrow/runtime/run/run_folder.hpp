@@ -6,10 +6,8 @@
 #include <string>
 #include <vector>
 
-#include "marrow/base/export.hpp"
-#include "marrow/runtime/run/executor.hpp"
+#include "marrow/runtime/run/replay.hpp"
 #include "marrow/runtime/run/run_log.hpp"
-#include "marrow/runtime/run/run_recipe.hpp"
 
 namespace MARROW_EXPORT marrow {
 
@@ -42,7 +40,7 @@ class RunFolder {
     std::string absent;              ///< "node 'x' failed", which may fail: why it is not there, or not as a whole
   };
   /// Writes those outputs of the pipeline that were made. Each PNG file among them carries the recipe
-  /// (run_recipe.hpp). Without a recipe, outputs have the same bytes wherever their data lie.
+  /// (replay.hpp). Without a recipe, outputs have the same bytes wherever their data lie.
   std::vector<Written> write_outputs(const Pipeline& pipeline, const RunResult& result, const Catalogue& catalogue,
                                      const std::optional<RunRecipe>& recipe);
   RunLog& log() { return *log_; }

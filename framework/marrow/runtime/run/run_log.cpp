@@ -8,7 +8,6 @@
 
 #include <mutex>
 
-#include "marrow/base/error.hpp"
 #include "marrow/base/printable.hpp"
 
 namespace marrow {

@@ -4,7 +4,6 @@
 #include <memory>
 #include <string>
 
-#include "marrow/base/export.hpp"
 #include "marrow/runtime/node/context.hpp"
 
 namespace MARROW_EXPORT marrow {

@@ -9,10 +9,8 @@
 #include <cstring>
 #include <opencv2/core/utility.hpp>
 
-#include "marrow/base/error.hpp"
 #include "marrow/plugin.hpp"
 #include "marrow/runtime/plugins/manifest.hpp"
-#include "marrow/runtime/process/packed_values.hpp"
 #include "marrow/runtime/process/worker.hpp"
 #include "marrow/runtime/run/apart.hpp"
 #include "marrow/runtime/run/run_log.hpp"

@@ -4,7 +4,6 @@
 #include <exception>
 
 #include "marrow/runtime/plugins/descriptions.hpp"
-#include "marrow/runtime/process/worker.hpp"
 #include "marrow/runtime/run/apart.hpp"
 
 int main() {

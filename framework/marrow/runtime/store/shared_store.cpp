@@ -1,14 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "marrow/runtime/store/shared_store.hpp"
 
-#include "marrow/runtime/store/shared_claim.hpp"
 #include "marrow/runtime/store/shared_folder.hpp"
 
-#include <algorithm>
 #include <cstdlib>
 #include <new>
 
-#include "marrow/base/plain_path.hpp"
+#include "marrow/base/file_names.hpp"
 #include "marrow/runtime/store/store_collect.hpp"
 #include "marrow/runtime/store/store_entry.hpp"
 #include "marrow/runtime/store/store_folder.hpp"

@@ -10,7 +10,6 @@
 #include <string>
 #include <vector>
 
-#include "marrow/base/export.hpp"
 #include "marrow/runtime/store/store.hpp"
 
 namespace MARROW_EXPORT marrow {

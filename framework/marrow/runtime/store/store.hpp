@@ -12,8 +12,6 @@
 #include <vector>
 
 #include "marrow/base/descriptor.hpp"
-#include "marrow/base/export.hpp"
-#include "marrow/base/fields.hpp"
 #include "marrow/runtime/node/value.hpp"
 
 namespace MARROW_EXPORT marrow {

@@ -1,15 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "marrow/runtime/store/store_collect.hpp"
 
-#include <algorithm>
 #include <chrono>
 #include <cstdlib>
-#include <map>
 
-#include "marrow/base/atomic_file.hpp"
-#include "marrow/base/folder_use.hpp"
-#include "marrow/base/remove_tree.hpp"
-#include "marrow/runtime/store/shared_claim.hpp"
+#include "marrow/base/temporary_folder.hpp"
+#include "marrow/base/text_file.hpp"
+#include "marrow/runtime/store/shared_folder.hpp"
 #include "marrow/runtime/store/store_entry.hpp"
 #include "marrow/runtime/store/store_folder.hpp"
 

@@ -1,9 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "marrow/runtime/store/store_entry.hpp"
 
-#include <algorithm>
-#include <array>
-#include <cstring>
 #include <mutex>
 #include <new>
 
@@ -27,20 +24,6 @@ constexpr int kMostReadings = 3;  // to read a value
 
 const char* const kDamaged = "the entry is not whole";
 
-/// Counts the bytes, and passes them on if there is somewhere to.
-class Counter : public Archive {
- public:
-  explicit Counter(Archive* out = nullptr) : out_(out) {}
-  void bytes(const void* data, std::size_t size) override {
-    if (out_) out_->bytes(data, size);
-    count += size;
-  }
-  std::uint64_t count = 0;
-
- private:
-  Archive* out_;
-};
-
 /// Passes the bytes on and hashes them.
 class HashingArchive : public Archive {
  public:
@@ -63,7 +46,7 @@ void add_leaf(const Value& value, EntryDescription& description, int depth) {
   if (!value.is_list() && !value.is_absent()) {
     if (!value.type.content) throw Error("functions are not kept");
     if (!value.data) throw Error("a result that was not made is not kept");
-    Counter counter;
+    ByteCounter counter;
     value.type.content->pack(value.data.get(), counter);
     leaf.present = true;
     leaf.size = counter.count;
@@ -170,7 +153,7 @@ void write_description(Archive& out, const EntryDescription& description) {
 
 void write_entry(Archive& out, const EntryDescription& description, const std::vector<Value>& outputs) {
   write_description(out, description);
-  Counter payload(&out);
+  ByteCounter payload(&out);
   for (const Value& output : outputs) write_values(payload, output);
   if (payload.count != description.payload) throw Error("the result was changed while it was kept");
 }

@@ -6,7 +6,6 @@
 #include <string>
 #include <vector>
 
-#include "marrow/base/export.hpp"
 #include "marrow/runtime/store/store.hpp"
 #include "marrow/runtime/store/store_file.hpp"
 

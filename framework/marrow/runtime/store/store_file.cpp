@@ -5,14 +5,11 @@
 #include <sys/stat.h>
 #include <time.h>
 
-#include <algorithm>
 #include <cerrno>
 #include <cstdlib>
-#include <cstring>
 #include <new>
 
-#include "marrow/base/atomic_file.hpp"
-#include "marrow/base/reason_of_exception.hpp"
+#include "marrow/base/text_file.hpp"
 #include "marrow/runtime/store/store_folder.hpp"
 
 namespace marrow {

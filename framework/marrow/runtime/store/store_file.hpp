@@ -12,7 +12,6 @@
 #include <vector>
 
 #include "marrow/base/descriptor.hpp"
-#include "marrow/base/export.hpp"
 #include "marrow/base/hash.hpp"
 
 namespace MARROW_EXPORT_TO_TESTS marrow {

@@ -5,18 +5,15 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <sys/file.h>
 #include <cerrno>
 #include <cstdio>
-#include <cstring>
-#include <optional>
 
-#include "marrow/base/atomic_file.hpp"
-#include "marrow/base/error.hpp"
+#include "marrow/base/framework_file.hpp"
 #include "marrow/base/number_text.hpp"
-#include "marrow/base/process_identity.hpp"
-#include "marrow/base/user_folder.hpp"
+#include "marrow/base/process_tree.hpp"
+#include "marrow/base/text_file.hpp"
 #include "marrow/runtime/store/store.hpp"
-#include "marrow/runtime/store/store_file.hpp"
 
 namespace marrow {
 namespace {
@@ -108,6 +105,18 @@ FolderState examine_own(const fs::path& folder, mode_t mode) {
   if (faccessat(AT_FDCWD, folder.c_str(), R_OK | W_OK | X_OK, AT_EACCESS) != 0)
     return {false, "cannot write to " + folder.string() + ": " + std::strerror(errno)};
   return {mark == Mark::ours, ""};
+}
+
+/// Closing it releases its locks.
+Descriptor open_folder(const fs::path& folder) {
+  return Descriptor(open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_NOFOLLOW | O_CLOEXEC));
+}
+
+bool is_still(const Descriptor& opened, const fs::path& folder) {
+  struct stat held {
+  }, named{};
+  return fstat(opened, &held) == 0 && lstat(folder.c_str(), &named) == 0 && held.st_dev == named.st_dev &&
+         held.st_ino == named.st_ino;
 }
 
 }  // namespace
@@ -258,6 +267,30 @@ bool is_abandoned(const StoreItem& temporary, const std::optional<timespec>& now
   if (life_of(temporary.writer) == Life::ended) return true;
   struct stat status {};
   return now && lstat(temporary.path.c_str(), &status) == 0 && now->tv_sec - status.st_mtime > kDay_s;
+}
+
+std::shared_ptr<const void> use_folder(const fs::path& folder) {
+  const auto held = std::make_shared<Descriptor>(open_folder(folder));
+  if (!held->is_open()) return nullptr;
+  // This wait is short: a process that removes a folder locks it only while it renames it.
+  while (flock(*held, LOCK_SH) != 0 && errno == EINTR) continue;
+  return is_still(*held, folder) ? held : nullptr;
+}
+
+void rename_unused(const fs::path& folder, const fs::path& to, std::error_code& error) {
+  const Descriptor held = open_folder(folder);
+  const bool is_gone = !held.is_open() && errno == ENOENT;
+  if (held.is_open() && flock(held, LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK) {
+    error = std::make_error_code(std::errc::device_or_resource_busy);
+    return;
+  }
+  // If it was missing, or another process renamed it before it was locked, a new folder without a lock may have its
+  // name.
+  if (is_gone || (held.is_open() && !is_still(held, folder))) {
+    error = std::make_error_code(std::errc::no_such_file_or_directory);
+    return;
+  }
+  fs::rename(folder, to, error);
 }
 
 }  // namespace marrow

@@ -12,13 +12,13 @@
 #include <time.h>
 
 #include <filesystem>
+#include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
+#include <system_error>
 #include <vector>
 
-#include "marrow/base/export.hpp"
-#include "marrow/base/hash.hpp"
 #include "marrow/runtime/store/store_file.hpp"
 
 namespace MARROW_EXPORT marrow {
@@ -70,5 +70,14 @@ std::optional<timespec> time_in(const std::filesystem::path& folder, const Permi
 /// Whether the process that writes a temporary has ended. If that cannot be known, because it runs on another host or
 /// left no identity, it counts as ended when the file was not changed for a day before `now`.
 bool is_abandoned(const StoreItem& temporary, const std::optional<timespec>& now);
+
+// Folders of a store are marked as used, so that no other process removes them. If a process dies, the kernel ends its
+// use. On file systems without locks, this has no effect.
+
+/// Holds the folder as long as the returned pointer lives. Returns nullptr if the folder does not exist (any more).
+std::shared_ptr<const void> use_folder(const std::filesystem::path& folder);
+
+/// Renames the folder, unless a process holds it: then `error` is std::errc::device_or_resource_busy.
+void rename_unused(const std::filesystem::path& folder, const std::filesystem::path& to, std::error_code& error);
 
 }  // namespace marrow

@@ -2,8 +2,6 @@
 #pragma once
 // For nodes that are wrong in one way each: the suite of their kind must catch each of them. Most of them change what
 // one of marrow's own nodes gives. "plain" changes nothing.
-#include <algorithm>
-#include <atomic>
 #include <marrow/plugin.hpp>
 #include <marrow/testing/node.hpp>
 
@@ -35,6 +33,14 @@ std::shared_ptr<const T> right_function(const std::string& node, const std::stri
   };
   const auto kept = std::make_shared<const Kept>(Kept{made, inputs});
   return {kept, &kept->function.template as<T>()};
+}
+
+/// Declares a node of a kind for each fault: `function` gives its function, `ports` declares its ports and options.
+template <Fault... faults>
+void declare(marrow::Plugin& plugin, const std::string& kind, auto function, auto ports) {
+  (ports(plugin.node(kind + "." + faults.name, function.template operator()<faults>())
+             .summary("For a test of the suite")),
+   ...);
 }
 
 /// How often it was called, for nodes that do not give the same each time.

@@ -1,9 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // A plain check of cameras against points, five that are wrong in one way each, and a camera that is none: the suite
 // must catch each.
-#include <cmath>
 #include <cstdio>
-#include <filesystem>
 #include <fstream>
 
 #include "wrong.hpp"
@@ -53,19 +51,15 @@ marrow::Camera left_handed() {
   return camera;
 }
 
-template <wrong::Fault... faults>
-void declare(marrow::Plugin& plugin) {
-  (plugin.node(std::string("camera.") + faults.name, check<faults>)
-       .summary("For a test of the suite")
-       .in("views", "images with the cameras to check", marrow::over("view"))
-       .out("metrics", "figures")
-       .option("points", &Options::points, "points and where they are seen"),
-   ...);
-}
-
 }  // namespace
 
 MARROW_PLUGIN(plugin) {
-  declare<"plain", "silent", "anxious", "careless", "changing", "trusting">(plugin);
+  wrong::declare<"plain", "silent", "anxious", "careless", "changing", "trusting">(
+      plugin, "camera", []<wrong::Fault fault>() { return &check<fault>; },
+      [](auto&& node) {
+        node.in("views", "images with the cameras to check", marrow::over("view"))
+            .out("metrics", "figures")
+            .option("points", &Options::points, "points and where they are seen");
+      });
   plugin.node("camera.left_handed", left_handed).summary("For a test of the suite").out("camera", "geometry");
 }

@@ -22,15 +22,10 @@ marrow::EdgeMap extract(const marrow::View& view) {
   return map;
 }
 
-template <wrong::Fault... faults>
-void declare(marrow::Plugin& plugin) {
-  (plugin.node(std::string("edges.") + faults.name, extract<faults>)
-       .summary("For a test of the suite")
-       .in("view", "X-ray view")
-       .out("edges", "edge pixels"),
-   ...);
-}
-
 }  // namespace
 
-MARROW_PLUGIN(plugin) { declare<"plain", "shifted", "turned", "changing", "unsorted", "crashing">(plugin); }
+MARROW_PLUGIN(plugin) {
+  wrong::declare<"plain", "shifted", "turned", "changing", "unsorted", "crashing">(
+      plugin, "edges", []<wrong::Fault fault>() { return &extract<fault>; },
+      [](auto&& node) { node.in("view", "X-ray view").out("edges", "edge pixels"); });
+}

@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <atomic>
-
 #include "wrong.hpp"
 
 namespace {
@@ -31,15 +29,10 @@ Mesh polygonise(const SignedField& field) {
   return mesh;
 }
 
-template <wrong::Fault... faults>
-void declare(marrow::Plugin& plugin) {
-  (plugin.node(std::string("mesh.") + faults.name, polygonise<faults>)
-       .summary("For a test of the suite")
-       .in("field", "signed distance")
-       .out("mesh", "surface"),
-   ...);
-}
-
 }  // namespace
 
-MARROW_PLUGIN(plugin) { declare<"plain", "inward", "open", "pinched", "hasty", "fat", "unturned", "endless">(plugin); }
+MARROW_PLUGIN(plugin) {
+  wrong::declare<"plain", "inward", "open", "pinched", "hasty", "fat", "unturned", "endless">(
+      plugin, "mesh", []<wrong::Fault fault>() { return &polygonise<fault>; },
+      [](auto&& node) { node.in("field", "signed distance").out("mesh", "surface"); });
+}

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 // A plain search along the coordinates, and others that are wrong in one way each: the suite must catch each of them.
-#include <cmath>
 
 #include "wrong.hpp"
 
@@ -49,17 +48,10 @@ std::shared_ptr<const marrow::Optimizer> make() {
   return std::make_shared<Search<fault>>();
 }
 
-template <wrong::Fault... faults>
-void declare(marrow::Plugin& plugin) {
-  (plugin.node(std::string("optimizer.") + faults.name, make<faults>)
-       .summary("For a test of the suite")
-       .trait("needs_start")
-       .out("optimizer", "minimiser"),
-   ...);
-}
-
 }  // namespace
 
 MARROW_PLUGIN(plugin) {
-  declare<"plain", "lazy", "spending", "unbounded", "fooled", "changing", "tireless", "trusting", "inventive">(plugin);
+  wrong::declare<"plain", "lazy", "spending", "unbounded", "fooled", "changing", "tireless", "trusting", "inventive">(
+      plugin, "optimizer", []<wrong::Fault fault>() { return &make<fault>; },
+      [](auto&& node) { node.trait("needs_start").out("optimizer", "minimiser"); });
 }

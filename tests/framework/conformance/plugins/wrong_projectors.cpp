@@ -87,28 +87,14 @@ std::shared_ptr<const RadiographProjector> radiograph(const marrow::Volume& volu
       wrong::right_function<RadiographProjector>("project.siddon_jacobs", "projector", inputs));
 }
 
-template <wrong::Fault... faults>
-void declare_outlines(marrow::Plugin& plugin) {
-  (plugin.node(std::string("project.") + faults.name, outline<faults>)
-       .summary("For a test of the suite")
-       .in("model", "surface")
-       .out("projector", "draws the outline"),
-   ...);
-}
-template <wrong::Fault... faults>
-void declare_radiographs(marrow::Plugin& plugin) {
-  (plugin.node(std::string("project.") + faults.name, radiograph<faults>)
-       .summary("For a test of the suite")
-       .in("volume", "CT")
-       .in("field", "fragment")
-       .out("projector", "makes radiographs"),
-   ...);
-}
-
 }  // namespace
 
 MARROW_PLUGIN(plugin) {
-  declare_outlines<"plain_outline", "shifted_outline", "silent", "inward", "gaps", "slanted">(plugin);
-  declare_radiographs<"plain_radiograph", "shifted_radiograph", "dense", "narrow", "behind", "coarse", "everything",
-                      "changing">(plugin);
+  wrong::declare<"plain_outline", "shifted_outline", "silent", "inward", "gaps", "slanted">(
+      plugin, "project", []<wrong::Fault fault>() { return &outline<fault>; },
+      [](auto&& node) { node.in("model", "surface").out("projector", "draws the outline"); });
+  wrong::declare<"plain_radiograph", "shifted_radiograph", "dense", "narrow", "behind", "coarse", "everything",
+                 "changing">(
+      plugin, "project", []<wrong::Fault fault>() { return &radiograph<fault>; },
+      [](auto&& node) { node.in("volume", "CT").in("field", "fragment").out("projector", "makes radiographs"); });
 }

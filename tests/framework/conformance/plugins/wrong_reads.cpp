@@ -1,11 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // A plain node of the kind read, and others that are wrong in one way each: the suite must catch each of them.
-#include <algorithm>
-#include <filesystem>
 #include <fstream>
 #include <sstream>
-#include <string>
-#include <vector>
 
 #include "wrong.hpp"
 
@@ -50,15 +46,10 @@ marrow::Pose pose(const Options& options) {
   return found;
 }
 
-template <wrong::Fault... faults>
-void declare(marrow::Plugin& plugin) {
-  (plugin.node(std::string("read.") + faults.name, pose<faults>)
-       .summary("a pose from a file of marrow's")
-       .out("pose", "the pose")
-       .option("path", &Options::path, "the file", marrow::required()),
-   ...);
-}
-
 }  // namespace
 
-MARROW_PLUGIN(plugin) { declare<"plain", "taking_anything", "nameless", "shifted">(plugin); }
+MARROW_PLUGIN(plugin) {
+  wrong::declare<"plain", "taking_anything", "nameless", "shifted">(
+      plugin, "read", []<wrong::Fault fault>() { return &pose<fault>; },
+      [](auto&& node) { node.out("pose", "the pose").option("path", &Options::path, "the file", marrow::required()); });
+}

@@ -33,16 +33,14 @@ List<SignedField> segment(const marrow::Volume& volume, const List<Seeds>& seeds
   return fields;
 }
 
-template <wrong::Fault... faults>
-void declare(marrow::Plugin& plugin) {
-  (plugin.node(std::string("segment.") + faults.name, segment<faults>)
-       .summary("For a test of the suite")
-       .in("volume", "CT")
-       .in("seeds", "points in each fragment", marrow::over("fragment"))
-       .out("field", "signed distances", marrow::over("fragment")),
-   ...);
-}
-
 }  // namespace
 
-MARROW_PLUGIN(plugin) { declare<"plain", "fat", "swapped", "merged", "changing", "careless">(plugin); }
+MARROW_PLUGIN(plugin) {
+  wrong::declare<"plain", "fat", "swapped", "merged", "changing", "careless">(
+      plugin, "segment", []<wrong::Fault fault>() { return &segment<fault>; },
+      [](auto&& node) {
+        node.in("volume", "CT")
+            .in("seeds", "points in each fragment", marrow::over("fragment"))
+            .out("field", "signed distances", marrow::over("fragment"));
+      });
+}

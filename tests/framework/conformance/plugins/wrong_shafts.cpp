@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <Eigen/Geometry>
 #include <cstdlib>
 
 #include "wrong.hpp"
@@ -34,17 +33,15 @@ ShaftLines shaft(const marrow::EdgeMap& edges, const View& view, const List<View
   return lines;
 }
 
-template <wrong::Fault... faults>
-void declare(marrow::Plugin& plugin) {
-  (plugin.node(std::string("shaft.") + faults.name, shaft<faults>)
-       .summary("For a test of the suite")
-       .in("edges", "edge pixels")
-       .in("view", "X-ray view")
-       .in("views", "all views", marrow::over("view"))
-       .out("lines", "borders of the shaft"),
-   ...);
-}
-
 }  // namespace
 
-MARROW_PLUGIN(plugin) { declare<"plain", "inner", "turned", "swapped", "sure", "crashing">(plugin); }
+MARROW_PLUGIN(plugin) {
+  wrong::declare<"plain", "inner", "turned", "swapped", "sure", "crashing">(
+      plugin, "shaft", []<wrong::Fault fault>() { return &shaft<fault>; },
+      [](auto&& node) {
+        node.in("edges", "edge pixels")
+            .in("view", "X-ray view")
+            .in("views", "all views", marrow::over("view"))
+            .out("lines", "borders of the shaft");
+      });
+}

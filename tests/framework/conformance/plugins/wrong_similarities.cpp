@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <cmath>
-
 #include "wrong.hpp"
 
 namespace {
@@ -68,23 +66,19 @@ std::shared_ptr<const Cost> make(const marrow::RadiographProjector& projector, c
       wrong::right_function<Cost>("similarity.normalised_cross_correlation", "cost", inputs), grey);
 }
 
-template <wrong::Fault... faults>
-void declare(marrow::Plugin& plugin) {
-  (plugin.node(std::string("similarity.") + faults.name, make<faults>)
-       .summary("For a test of the suite")
-       .trait("unmoved_by_gain")
-       .trait("derivatives")
-       .in("projector", "makes radiographs")
-       .in("views", "views", marrow::over("view"))
-       .in("others", "poses", marrow::over("fragment"))
-       .in("other_projectors", "projectors", marrow::over("fragment"))
-       .out("cost", "how badly radiograph and image agree"),
-   ...);
-}
-
 }  // namespace
 
 MARROW_PLUGIN(plugin) {
-  declare<"plain", "shifted", "careless", "moved", "changing", "unordered", "unmasked", "flat", "levels", "steep",
-          "alone">(plugin);
+  wrong::declare<"plain", "shifted", "careless", "moved", "changing", "unordered", "unmasked", "flat", "levels",
+                 "steep", "alone">(
+      plugin, "similarity", []<wrong::Fault fault>() { return &make<fault>; },
+      [](auto&& node) {
+        node.trait("unmoved_by_gain")
+            .trait("derivatives")
+            .in("projector", "makes radiographs")
+            .in("views", "views", marrow::over("view"))
+            .in("others", "poses", marrow::over("fragment"))
+            .in("other_projectors", "projectors", marrow::over("fragment"))
+            .out("cost", "how badly radiograph and image agree");
+      });
 }

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 // Nodes for starts for the tests of `marrow conformance`: a plain right one, and others that are wrong in one way each.
-#include <Eigen/Geometry>
 #include <marrow/plugin.hpp>
 
 namespace {

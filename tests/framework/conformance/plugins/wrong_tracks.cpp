@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 // A plain node that follows a bone, and others that are wrong in one way each: the suite must catch each of them.
-#include <cmath>
 
 #include "wrong.hpp"
 
@@ -39,18 +38,13 @@ List<Pose> track(const List<Pose>& poses) {
   return result;
 }
 
-template <wrong::Fault... faults>
-void declare(marrow::Plugin& plugin) {
-  (plugin.node(std::string("track.") + faults.name, track<faults>)
-       .summary("For a test of the suite")
-       .in("poses", "measured poses", marrow::over("frame"))
-       .out("poses", "better poses", marrow::over("frame")),
-   ...);
-}
-
 }  // namespace
 
 MARROW_PLUGIN(plugin) {
-  declare<"plain", "lagging", "drifting", "shaking", "renamed", "careless", "changing", "averaging", "rounding",
-          "one_sided">(plugin);
+  wrong::declare<"plain", "lagging", "drifting", "shaking", "renamed", "careless", "changing", "averaging", "rounding",
+                 "one_sided">(
+      plugin, "track", []<wrong::Fault fault>() { return &track<fault>; },
+      [](auto&& node) {
+        node.in("poses", "measured poses", marrow::over("frame")).out("poses", "better poses", marrow::over("frame"));
+      });
 }

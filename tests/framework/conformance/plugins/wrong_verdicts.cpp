@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 // Verdicts for the tests of `marrow conformance`: a plain right one, and others that say the same of every pose.
-#include <algorithm>
 #include <marrow/plugin.hpp>
 
 namespace {

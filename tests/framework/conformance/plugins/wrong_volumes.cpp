@@ -37,28 +37,15 @@ Volume filled(const marrow::Mesh& mesh) {
   return volume;
 }
 
-template <wrong::Fault... faults>
-void declare_changes(marrow::Plugin& plugin) {
-  (plugin.node(std::string("volume.") + faults.name, changed<faults>)
-       .summary("For a test of the suite")
-       .in("volume", "CT")
-       .out("volume", "the CT"),
-   ...);
-}
-template <wrong::Fault... faults>
-void declare_fillings(marrow::Plugin& plugin) {
-  (plugin.node(std::string("volume.") + faults.name, filled<faults>)
-       .summary("For a test of the suite")
-       .in("mesh", "surface")
-       .out("volume", "its inside"),
-   ...);
-}
-
 }  // namespace
 
 MARROW_PLUGIN(plugin) {
-  declare_changes<"plain_ct", "another_grid", "brighter", "by_place", "blurred", "careless", "changing">(plugin);
-  declare_fillings<"plain_surface", "larger", "shifted", "other_frame">(plugin);
+  wrong::declare<"plain_ct", "another_grid", "brighter", "by_place", "blurred", "careless", "changing">(
+      plugin, "volume", []<wrong::Fault fault>() { return &changed<fault>; },
+      [](auto&& node) { node.in("volume", "CT").out("volume", "the CT"); });
+  wrong::declare<"plain_surface", "larger", "shifted", "other_frame">(
+      plugin, "volume", []<wrong::Fault fault>() { return &filled<fault>; },
+      [](auto&& node) { node.in("mesh", "surface").out("volume", "its inside"); });
   plugin.node("volume.metal", changed<"metal">)
       .summary("For a test of the suite")
       .in("volume", "CT")

@@ -7,10 +7,6 @@
 
 namespace marrow::test {
 
-/// Expects that a text holds another; both are shown if it does not.
-#define EXPECT_CONTAINS(text, part) EXPECT_PRED2(marrow::test::contains, text, part)
-inline bool contains(const std::string& text, const std::string& part) { return text.find(part) != std::string::npos; }
-
 /// Files of other programs, beside the tests that read them.
 inline const std::filesystem::path kData =
     std::filesystem::path(MARROW_SOURCE_DIR) / "tests/plugins/toolbox/exchange/data";

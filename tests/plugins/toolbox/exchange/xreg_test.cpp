@@ -8,8 +8,7 @@ namespace xreg_test {
 using namespace marrow;
 using namespace marrow::test;
 using Eigen::Vector3d, Eigen::Vector2d;
-using exchange::XregFile;
-using exchange::XregProjection;
+using exchange::XregFile, exchange::XregProjection;
 using Xreg = InAFolder;
 
 // Made with h5py as xReg lays its files out, with a projection in each of the three frames of cameras, images of 200 x
@@ -61,13 +60,13 @@ TEST_F(Xreg, SeveralProjectionsAtOnce) {
     options["path"] = kFile.string();
     return shipped::refusal("read.cameras", {}, options);
   };
-  EXPECT_CONTAINS(refusal("projections", std::vector<double>{2, 3}), "there is no projection 3");
-  EXPECT_CONTAINS(refusal("projections", std::vector<double>{2, 0.5}),
-                  "projections: expected whole numbers from 0, got 0.500000");
-  EXPECT_CONTAINS(refusal("image_size_px", std::vector<double>{2, 3}),
-                  "says itself how large its images are; leave out image_size_px");
-  EXPECT_CONTAINS(shipped::refusal("read.cameras", {}, {{"path", "a.txt"}, {"names", std::vector<std::string>{"a"}}}),
-                  "a.txt: expected RTK's geometry (.xml) or xReg's projection data (.h5)");
+  EXPECT_HAS(refusal("projections", std::vector<double>{2, 3}), "there is no projection 3");
+  EXPECT_HAS(refusal("projections", std::vector<double>{2, 0.5}),
+             "projections: expected whole numbers from 0, got 0.500000");
+  EXPECT_HAS(refusal("image_size_px", std::vector<double>{2, 3}),
+             "says itself how large its images are; leave out image_size_px");
+  EXPECT_HAS(shipped::refusal("read.cameras", {}, {{"path", "a.txt"}, {"names", std::vector<std::string>{"a"}}}),
+             "a.txt: expected RTK's geometry (.xml) or xReg's projection data (.h5)");
 }
 
 Landmarks landmarks_at(const std::filesystem::path& points, shipped::Options options) {
@@ -148,9 +147,9 @@ TEST_F(Xreg, DiagnosesWhatCannotBeWritten) {
                             {{"pixel_mm", std::vector<double>{0.4, 0.5}}});
   };
   landmarks.seen[0].view = "oblique";
-  EXPECT_CONTAINS(refusal(), "landmark 'head' is seen in view 'oblique', which has no camera here; wire all cameras");
+  EXPECT_HAS(refusal(), "landmark 'head' is seen in view 'oblique', which has no camera here; wire all cameras");
   landmarks.seen[0] = {"a/b", "lateral", {1, 2}};
-  EXPECT_CONTAINS(refusal(), "landmark 'a/b': a file of xReg cannot hold a name with '/'; rename it");
+  EXPECT_HAS(refusal(), "landmark 'a/b': a file of xReg cannot hold a name with '/'; rename it");
 }
 
 TEST_F(Xreg, DiagnosesFaults) {

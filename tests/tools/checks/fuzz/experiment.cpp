@@ -2,7 +2,6 @@
 // Experiments, in a folder with a pipeline, a pipeline that simulates, and folders of cases.
 #include "marrow/compare/experiment.hpp"
 #include "nodes.hpp"
-#include "target.hpp"
 
 namespace {
 

@@ -2,7 +2,6 @@
 // Pipelines. Behind the first zero byte are the arguments of the command line: key=value, one a line.
 #include "marrow/runtime/pipeline/pipeline.hpp"
 #include "nodes.hpp"
-#include "target.hpp"
 
 namespace {
 

@@ -3,29 +3,18 @@
 #include <errno.h>
 #include <zlib.h>
 
-#include <map>
-#include <vector>
-
 #include "tests/harness/without_registration.hpp"  // before the nodes
 
 #include "plugins/read/case.cpp"
 
 #include "marrow/camera/points_file.hpp"
-#include "marrow/read/calibration_file.hpp"
-#include "marrow/read/projections.hpp"
 #include "marrow/toolbox/calibration/board.hpp"
 #include "marrow/toolbox/exchange/autoscoper_trial.hpp"
 #include "marrow/toolbox/exchange/itk_transform.hpp"
-#include "marrow/toolbox/exchange/marked_values.hpp"
-#include "marrow/toolbox/exchange/maya_camera.hpp"
-#include "marrow/toolbox/exchange/plastimatch_camera.hpp"
+#include "marrow/toolbox/exchange/markups.hpp"
 #include "marrow/toolbox/exchange/surface_file.hpp"
-#include "marrow/toolbox/files/camera_file.hpp"
 #include "marrow/toolbox/files/label_file.hpp"
-#include "marrow/toolbox/files/mesh_file.hpp"
 #include "marrow/toolbox/files/samples_out.hpp"
-#include "marrow/toolbox/files/sequence_files.hpp"
-#include "marrow/toolbox/files/volume_file.hpp"
 #include "marrow/toolbox/files/xray_header.hpp"
 #include "node_readers.hpp"
 #include "plugins/read/video.hpp"

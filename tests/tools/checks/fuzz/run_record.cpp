@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The files that a run leaves: run.json, the pipeline.yaml beside it, the row of a cell, and a picture.
-#include "difference/run_record.hpp"
+#include "difference/difference.hpp"
 
-#include "marrow/base/hash.hpp"
 #include "marrow/base/json_text.hpp"
 #include "marrow/compare/cell.hpp"
 #include "run_files.hpp"

@@ -2,8 +2,6 @@
 // Entries of the store: as they are, with a description that has the right hash, and the packed values alone.
 #include "marrow/runtime/store/store.hpp"
 
-#include <cstring>
-
 #include "marrow/runtime/node/types.hpp"
 #include "target.hpp"
 

@@ -5,7 +5,6 @@
 // leak, more than 256 MB or more than 2 s is a finding.
 #include <cstdint>
 #include <filesystem>
-#include <string>
 #include <string_view>
 
 #include "marrow/base/error.hpp"
