@@ -82,10 +82,11 @@ function listenPointer(view) {
         drag.last = place;
       }
     }
+    view.under = event.pointerType === 'mouse' ? place : null;
     if (!view.state.ct || !view.view) return;
     const there = view.at(place);
     view.state.pointed({view, ...there});
-    if (event.pointerType === 'mouse') view.tell(place, there.value_hu);
+    if (view.under) view.tell(place, there.value_hu);
   });
   const end = (event) => {
     const {drag} = view;
@@ -99,6 +100,7 @@ function listenPointer(view) {
   canvas.addEventListener('pointercancel', end);
   canvas.addEventListener('pointerleave', () => {
     view.state.pointed(null);
+    view.under = null;
     view.hint.hidden = true;
   });
 }

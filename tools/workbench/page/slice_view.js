@@ -160,7 +160,7 @@ function draw(view) {
 
 export class SliceView {
   constructor(name, state) {
-    Object.assign(this, {name, state, slices: new Map(), wanted: null, isAsking: false, drag: null});
+    Object.assign(this, {name, state, slices: new Map(), wanted: null, isAsking: false, drag: null, under: null});
     this.canvas = el('canvas', {tabindex: 0, role: 'application', 'data-slice': name});
     this.hint = el('span', {class: 'cursor-hint', 'aria-hidden': 'true', hidden: true});
     this.slider = el('input', {type: 'range', min: 0, step: 1, 'aria-label': name + ' slice'});
@@ -235,6 +235,7 @@ export class SliceView {
         if (this.slices.size > 64) this.slices.delete(this.slices.keys().next().value);
         if (index === this.wanted) {
           this.draw();
+          if (this.under) this.tell(this.under, this.at(this.under).value_hu);
           this.state.tell('slice');
         }
       }
